@@ -1,0 +1,247 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "brick/measure_error.h"
+#include "commands.h"
+#include "field_selection.h"
+#include "io/atomic_file.h"
+#include "io/read_mesh.h"
+#include "predict_cost.h"
+#include "registry/registry.h"
+#include "report_text.h"
+
+namespace tessera {
+
+namespace {
+
+/// One mesh file of a run and the file it becomes.
+struct Step {
+    std::string input, output;
+};
+
+std::string numberedName(const std::string& pattern, std::size_t number) {
+    const std::size_t begin = pattern.find('#');
+    if (begin == std::string::npos) return pattern;
+    const std::size_t end = std::min(pattern.find_first_not_of('#', begin), pattern.size());
+    return fmt::format("{}{:0{}}{}", pattern.substr(0, begin), number, end - begin, pattern.substr(end));
+}
+
+std::vector<Step> listSteps(const ResampleArguments& arguments) {
+    const std::vector<std::string> inputs = listSeries(arguments.input);
+    if (inputs.size() > 1 && !arguments.output.empty() && arguments.output.find('#') == std::string::npos)
+        throw InputError(fmt::format("{} names {} files: the output needs #### for the step's number, got '{}'", arguments.input,
+                                     inputs.size(), arguments.output));
+    std::vector<Step> steps;
+    for (std::size_t i = 0; i < inputs.size(); ++i) steps.push_back({inputs[i], numberedName(arguments.output, i)});
+    return steps;
+}
+
+void checkOutputs(const std::vector<Step>& steps, const ResampleArguments& arguments) {
+    namespace fs = std::filesystem;
+    const std::string& json = arguments.common.jsonPath;
+    if (!json.empty() && json != "-") checkWritable(json);
+    if (arguments.dryRun) return;
+    for (const Step& step : steps) {
+        std::error_code ignored;
+        if (fs::equivalent(step.input, step.output, ignored))
+            throw InputError(fmt::format("{}: the output would replace the input", step.output));
+        checkWritable(step.output);
+    }
+}
+
+/// The run of `tessera resample`: settings, and what the steps of a series share.
+class ResampleRun {
+  public:
+    explicit ResampleRun(const ResampleArguments& arguments)
+        : arguments_(arguments),
+          settings_(checkedSettings(arguments)),
+          resampler_(findResampler(arguments.algorithm)),
+          session_(arguments.common) {}
+    int run();
+
+  private:
+    void findSeriesRanges(const std::vector<Step>& steps);
+    Json runStep(const Step& step);
+    Json dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times);
+    Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
+                        StageTimes& times);
+    VdbWriteResult write(const Step& step, const MeshFile& file, const FieldSelection& selection, BrickResult& result,
+                         StageTimes& times);
+    void printResult(const Step& step, const BrickResult& result, const std::vector<LevelSummary>& levels,
+                     const VdbWriteResult& written, const StageTimes& times);
+
+    const ResampleArguments& arguments_;
+    ResampleSettings settings_;
+    const Resampler& resampler_;
+    Session session_;
+    StageTimes allTimes_;
+    Json series_;
+};
+
+int ResampleRun::run() {
+    const std::vector<Step> steps = listSteps(arguments_);
+    checkOutputs(steps, arguments_);
+    if (!arguments_.like.empty()) {
+        settings_.refine.frame = readVdbLattice(arguments_.like);
+        // The file's spacing is the finest; what the caller gave beside it would contradict it.
+        if (settings_.refine.resolution > 0 || settings_.refine.spacingWorld > 0)
+            throw InputError("--like sets the spacing: --resolution and --spacing can't be given with it");
+    }
+    if (steps.size() > 1) findSeriesRanges(steps);
+    Json reports = Json::array();
+    for (const Step& step : steps) reports.push_back(runStep(step));
+    if (arguments_.common.jsonPath.empty()) return 0;
+    if (steps.size() == 1) {
+        writeJson(arguments_.common.jsonPath, reports[0]);
+        return 0;
+    }
+    Json document{{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "resample"},
+                  {"stages", stagesJson(allTimes_)}, {"peak_memory_bytes", peakMemoryBytes()}, {"series", series_}};
+    document["steps"] = std::move(reports);
+    writeJson(arguments_.common.jsonPath, document);
+    return 0;
+}
+
+void ResampleRun::findSeriesRanges(const std::vector<Step>& steps) {
+    std::vector<FieldSummary> ranges;
+    Box3d bounds;
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        session_.execution.report("series", std::int64_t(i), std::int64_t(steps.size()));
+        const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
+        const TetMesh mesh = readMesh(steps[i].input, options, session_.execution).mesh;
+        bounds.include(mesh.boundsWorld());
+        for (FieldSummary& field : summarizeFields(mesh)) {
+            const auto same = std::find_if(ranges.begin(), ranges.end(), [&](const FieldSummary& other) {
+                return other.name == field.name && other.location == field.location;
+            });
+            if (same == ranges.end()) {
+                ranges.push_back(std::move(field));
+                continue;
+            }
+            for (std::size_t c = 0; c < std::min(same->ranges.size(), field.ranges.size()); ++c) {
+                same->ranges[c].min = std::min(same->ranges[c].min, field.ranges[c].min);
+                same->ranges[c].max = std::max(same->ranges[c].max, field.ranges[c].max);
+            }
+        }
+    }
+    series_ = seriesJson(steps.size(), bounds, ranges);
+    session_.print(fmt::format("series of {} steps\n{}", steps.size(), fieldsText(ranges)));
+}
+
+Json ResampleRun::runStep(const Step& step) {
+    StageTimes times;
+    Timer timer;
+    const ReadOptions readOptions{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
+    const MeshFile file = readMesh(step.input, readOptions, session_.execution);
+    times.readMs = timer.elapsedMs();
+    const FieldSelection selection = selectFields(file.mesh, settings_.fields);
+    RefineOptions options = settings_.refine;
+    for (const std::string& name : settings_.errorFields)
+        options.errorFields.push_back(findSelected(file.mesh, selection.fields, name));
+    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
+
+    Json report{{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "resample"},
+                {"input", step.input}, {"output", arguments_.dryRun ? Json(nullptr) : Json(step.output)},
+                {"algorithm", arguments_.algorithm}, {"criterion", arguments_.refine}, {"layout", arguments_.layout},
+                {"threads", session_.execution.threadCount()}};
+    Json rest = arguments_.dryRun ? dryRun(file, selection, options, times) : sampleAndWrite(step, file, selection, options, times);
+    report["stages"] = stagesJson(times);
+    report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
+    report.update(rest);
+    report["peak_memory_bytes"] = peakMemoryBytes();
+    allTimes_ += times;
+    return report;
+}
+
+Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times) {
+    Timer timer;
+    BrickTree tree;
+    if (options.criterion == Criterion::error) {
+        // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
+        BrickResult result = refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
+        tree = std::move(result.tree);
+    } else {
+        tree = planBricks(file.mesh, options, session_.execution);
+    }
+    times.planMs = timer.elapsedMs();
+    const PlanEstimate estimate = estimatePlan(tree, selection.channels);
+    const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels, resampler_, session_.execution);
+    session_.print(estimateText(estimate, cost.levelsMs, cost.flatMs) + "  nothing was written\n");
+    if (!settings_.refine.frame) settings_.refine.frame = FixedFrame{tree.originWorld(), tree.spacingWorld()};
+    Json json = levelsJson(tree, summarizeLevels(tree, {}));
+    json["estimate"] = estimateJson(estimate, cost.levelsMs, cost.flatMs);
+    return json;
+}
+
+VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const FieldSelection& selection, BrickResult& result,
+                                  StageTimes& times) {
+    Timer timer;
+    std::optional<NearestPointIndex> nearest;
+    std::optional<Reconstruction> reconstruction;
+    std::optional<ExtensionPoints> extension;
+    const bool flat = settings_.write.layout == VdbLayout::flat;
+    if (flat || arguments_.extendLayers > 0) nearest.emplace(file.mesh, session_.execution.threadCount());
+    if (flat) reconstruction.emplace(file.mesh, selection.fields, result.tree, result.store, *nearest);
+    if (arguments_.extendLayers > 0)
+        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest, arguments_.extendLayers,
+                                  session_.execution);
+    times.extendMs = timer.restart();
+    VdbWriteOptions options = settings_.write;
+    options.sourceFile = std::filesystem::path(step.input).filename().string();
+    VdbWriteResult written = writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
+                                      reconstruction ? &*reconstruction : nullptr, options, session_.execution);
+    times.writeMs = timer.elapsedMs();
+    return written;
+}
+
+Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                                 const RefineOptions& options, StageTimes& times) {
+    BrickResult result = refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
+    times.planMs = result.times.planMs;
+    times.resampleMs = result.times.resampleMs;
+    times.verifyMs = result.times.verifyMs;
+    for (std::size_t f = 0; f < selection.outputs.size() && f < result.report.fields.size(); ++f)
+        result.report.fields[f].name = selection.outputs[f].name;   // grid names are unique, names in the mesh need not be
+    // The first step decides for the whole series, so that nothing flickers.
+    if (!settings_.refine.frame)
+        settings_.refine.frame = FixedFrame{result.tree.originWorld(), result.tree.spacingWorld()};
+    const std::vector<LevelSummary> levels = summarizeLevels(result.tree, result.store);
+    const std::int64_t sampleBytes = result.store.memoryBytes();
+    const VdbWriteResult written = write(step, file, selection, result, times);
+    printResult(step, result, levels, written, times);
+
+    Json json = levelsJson(result.tree, levels);
+    json["coverage"] = coverageJson(result.report);
+    json["error"] = errorJson(result.report);
+    if (options.criterion == Criterion::error)
+        json["refinement"] = {{"max_error", options.maxError}, {"relative", options.maxErrorIsRelative},
+                              {"measure", arguments_.errorMeasure}, {"bounded", result.bounded},
+                              {"stopped_because", result.stoppedBecause}, {"rounds", result.rounds}};
+    json["statistics"] = statisticsJson(result.statistics);
+    json["write"] = writeResultJson(written);
+    json["sample_bytes"] = sampleBytes;
+    return json;
+}
+
+void ResampleRun::printResult(const Step& step, const BrickResult& result, const std::vector<LevelSummary>& levels,
+                              const VdbWriteResult& written, const StageTimes& times) {
+    std::string text = levelsText(levels) + errorText(result.report);
+    if (settings_.refine.criterion == Criterion::error)
+        text += result.bounded ? "  the error is within the bound\n"
+                               : fmt::format("  the error is NOT within the bound: {}\n", result.stoppedBecause);
+    for (const std::string& note : written.notes) text += "  " + note + "\n";
+    text += stagesText(times);
+    text += fmt::format("{}: {}, {} active voxels; peak memory {}\n", step.output, formatBytes(written.fileBytes),
+                        formatCount(written.activeVoxels), formatBytes(peakMemoryBytes()));
+    session_.print(text);
+}
+
+}  // namespace
+
+int runResample(const ResampleArguments& arguments) { return ResampleRun(arguments).run(); }
+
+}  // namespace tessera

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <string>
+
+#include "options.h"
+#include "progress.h"
+
+namespace tessera {
+
+/// What a command runs with: threads, the flag that a signal raises, and a progress bar.
+class Session {
+  public:
+    explicit Session(const CommonOptions& options);
+    Execution execution;
+    ProgressBar progress;
+
+    /// Prints to standard output, unless quiet or the JSON report goes there.
+    void print(const std::string& text);
+
+  private:
+    bool prints_;
+};
+
+struct InfoArguments {
+    CommonOptions common;
+    std::string path;
+    int timeStep = -1;
+};
+struct VerifyArguments {
+    CommonOptions common;
+    std::string meshPath, vdbPath;
+    int timeStep = -1;
+    int samples = 20000;
+};
+struct TetsArguments {
+    CommonOptions common;
+    std::string input, output;
+    int timeStep = -1;
+};
+struct PictureArguments {
+    CommonOptions common;
+    std::string input, output, field, axis = "z";
+    std::optional<double> at;
+    std::optional<int> component;
+    int width = 900;
+};
+
+void addInfoOptions(CLI::App& command, InfoArguments& arguments);
+void addVerifyOptions(CLI::App& command, VerifyArguments& arguments);
+void addTetsOptions(CLI::App& command, TetsArguments& arguments);
+void addPictureOptions(CLI::App& command, PictureArguments& arguments);
+
+/// Each returns the exit code and throws the library's errors.
+int runResample(const ResampleArguments& arguments);
+int runInfo(const InfoArguments& arguments);
+int runVerify(const VerifyArguments& arguments);
+int runTets(const TetsArguments& arguments);
+int runPicture(const PictureArguments& arguments);
+
+}  // namespace tessera

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/vdb_file.h"
+#include "mesh/tet_mesh.h"
+#include "options.h"
+
+namespace tessera {
+
+/// Names to ask a reader for: those of the choices without a "point:" or "cell:" in front. Empty: all.
+std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices, const std::vector<std::string>& errorFields);
+
+/// The chosen fields: indices into mesh.fields, and how each is named in the output.
+struct FieldSelection {
+    std::vector<int> fields;
+    std::vector<OutputField> outputs;
+    int channels = 0;
+};
+
+/// No choices: every field; a cell field with the name of a point field gets "_cell" appended. A choice may say "point:T" or "cell:T"; without,
+/// the point field is taken where there are both. Throws InputError listing the fields there are when one is missing.
+FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>& choices);
+
+/// Index into mesh.fields for a name as above, among `fields`. Throws InputError.
+int findSelected(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name);
+
+}  // namespace tessera

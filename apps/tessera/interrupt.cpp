@@ -1,0 +1,42 @@
+#include "interrupt.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include "io/atomic_file.h"
+
+namespace tessera {
+
+namespace {
+
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+std::atomic<bool> raised{false};
+std::atomic<int> signalNumber{0};
+
+void handleSignal(int number) {
+    if (raised.load()) {
+        removeTemporaryFiles();
+        _exit(128 + number);
+    }
+    signalNumber = number;
+    raised = true;
+}
+
+}  // namespace
+
+void installInterruptHandlers() {
+    struct sigaction action {};
+    action.sa_handler = handleSignal;
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+    // A file size limit and a closed pipe are reported by write(); the default action would kill the process before it cleans up.
+    signal(SIGXFSZ, SIG_IGN);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+const std::atomic<bool>& interruptFlag() { return raised; }
+
+int interruptSignal() { return signalNumber; }
+
+}  // namespace tessera

@@ -1,0 +1,86 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "base/error.h"
+#include "commands.h"
+#include "interrupt.h"
+
+namespace {
+
+constexpr int kExitFailure = 1;
+constexpr int kExitBadInput = 2;
+
+/// One line on standard error, whatever the message holds.
+void printError(const char* message) {
+    std::string line(message);
+    for (char& c : line)
+        if (c == '\n' || c == '\r') c = ' ';
+    while (!line.empty() && line.back() == ' ') line.pop_back();
+    fmt::print(stderr, "tessera: {}\n", line);
+}
+
+struct Arguments {
+    tessera::ResampleArguments resample;
+    tessera::InfoArguments info;
+    tessera::VerifyArguments verify;
+    tessera::TetsArguments tets;
+    tessera::PictureArguments picture;
+};
+
+void describe(CLI::App& app, Arguments& arguments) {
+    app.name("tessera");
+    app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
+    app.set_help_flag("-h,--help", "print this help and exit");
+    app.require_subcommand(1);
+    app.get_formatter()->column_width(34);
+    app.footer("Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit codes: 0 done, "
+               "2 bad input or usage, 1 any other failure, 130 interrupted.");
+    tessera::addResampleOptions(*app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
+                                arguments.resample);
+    tessera::addInfoOptions(*app.add_subcommand("info", "what a mesh file or a .vdb file holds"), arguments.info);
+    tessera::addVerifyOptions(*app.add_subcommand("verify", "check a .vdb file's error report against its mesh"), arguments.verify);
+    tessera::addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"), arguments.tets);
+    tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"), arguments.picture);
+}
+
+int run(const CLI::App& app, const Arguments& arguments) {
+    if (app.got_subcommand("resample")) return tessera::runResample(arguments.resample);
+    if (app.got_subcommand("info")) return tessera::runInfo(arguments.info);
+    if (app.got_subcommand("verify")) return tessera::runVerify(arguments.verify);
+    if (app.got_subcommand("tets")) return tessera::runTets(arguments.tets);
+    return tessera::runPicture(arguments.picture);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
+    Arguments arguments;
+    describe(app, arguments);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() == 0) return app.exit(error);   // --help, --version
+        printError(fmt::format("{} (tessera --help tells more)", error.what()).c_str());
+        return kExitBadInput;
+    }
+    tessera::installInterruptHandlers();
+    try {
+        return run(app, arguments);
+    } catch (const tessera::Cancelled&) {
+        printError("interrupted; nothing was written");
+        return 128 + tessera::interruptSignal();
+    } catch (const tessera::InputError& error) {
+        printError(error.what());
+        return kExitBadInput;
+    } catch (const std::bad_alloc&) {
+        printError("out of memory");
+    } catch (const std::exception& error) {
+        printError(error.what());
+    }
+    return kExitFailure;
+}

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/vec.h"
+#include "brick/refine.h"
+#include "io/vdb_file.h"
+
+namespace tessera {
+
+/// Options of every subcommand.
+struct CommonOptions {
+    int threads = 0;         ///< 0: one for every processor
+    bool quiet = false;
+    std::string jsonPath;    ///< empty: no report; "-": standard output
+};
+
+/// One entry of --field: a field of the mesh and the name of its grid.
+struct FieldChoice {
+    std::string source;
+    std::string name;
+};
+
+/// The words of `tessera resample`, as typed.
+struct ResampleArguments {
+    CommonOptions common;
+    std::string input, output;
+    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max", algorithm = "software";
+    std::optional<int> resolution;
+    std::optional<double> spacing;
+    std::optional<std::string> maxError;
+    double samplesPerElement = 2;
+    int maxLevels = 8;
+    int brickSize = 16;
+    int extendLayers = 0;
+    double background = 0;
+    double unitScale = 0;
+    int timeStep = -1;
+    std::string fields, errorFields, bounds, like, maxVoxels, maxMemory;
+    bool half = false;
+    bool dryRun = false;
+};
+
+/// The same, checked and converted; what depends on the mesh (field indices) is still missing.
+struct ResampleSettings {
+    RefineOptions refine;
+    VdbWriteOptions write;
+    std::vector<FieldChoice> fields;        ///< empty: all
+    std::vector<std::string> errorFields;   ///< empty: all chosen point fields
+};
+
+void addCommonOptions(CLI::App& command, CommonOptions& options);
+void addResampleOptions(CLI::App& command, ResampleArguments& arguments);
+
+/// Throws InputError naming the option, what was expected and what came.
+ResampleSettings checkedSettings(const ResampleArguments& arguments);
+
+/// "4096", "64K", "1.5M", "2G", "1T"; decimal multiples unless `binary`. Throws InputError naming `option`.
+std::int64_t parseCount(const std::string& option, const std::string& text, bool binary);
+/// "a,b=newname". Throws InputError for empty or repeated names.
+std::vector<FieldChoice> parseFields(const std::string& text);
+/// "x0,y0,z0,x1,y1,z1". Throws InputError.
+Box3d parseBounds(const std::string& text);
+
+}  // namespace tessera

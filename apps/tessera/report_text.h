@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "run_report.h"
+
+namespace tessera {
+
+/// Rows of cells as aligned columns; the first row is the heading, the first column is left-aligned.
+std::string formatTable(const std::vector<std::vector<std::string>>& rows);
+/// 1234567 -> "1,234,567".
+std::string formatCount(std::int64_t count);
+/// Bytes with a unit, e.g. "12.3 MB".
+std::string formatBytes(std::int64_t bytes);
+
+std::string importText(const std::string& path, const ImportStatistics& statistics, const Box3d& boundsWorld);
+std::string fieldsText(const std::vector<FieldSummary>& fields);
+std::string levelsText(const std::vector<LevelSummary>& levels);
+std::string errorText(const ErrorReport& report);
+std::string stagesText(const StageTimes& times);
+std::string estimateText(const PlanEstimate& estimate, double levelsMs, double flatMs);
+
+}  // namespace tessera

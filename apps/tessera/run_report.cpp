@@ -1,0 +1,173 @@
+#include "run_report.h"
+
+#include <fmt/format.h>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+
+#include "base/error.h"
+#include "io/atomic_file.h"
+#include "io/report_json.h"
+
+namespace tessera {
+
+namespace {
+
+Json vectorJson(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
+
+Json rangeJson(const ValueRange& range) {
+    return range.empty() ? Json(nullptr) : Json::array({range.min, range.max});
+}
+
+Json fieldsJson(const std::vector<FieldSummary>& fields) {
+    Json list = Json::array();
+    for (const FieldSummary& field : fields) {
+        Json ranges = Json::array();
+        for (const ValueRange& range : field.ranges) ranges.push_back(rangeJson(range));
+        list.push_back({{"name", field.name}, {"location", field.location}, {"components", field.ranges.size()}, {"ranges", ranges}});
+    }
+    return list;
+}
+
+}  // namespace
+
+StageTimes& StageTimes::operator+=(const StageTimes& other) {
+    readMs += other.readMs;
+    planMs += other.planMs;
+    resampleMs += other.resampleMs;
+    verifyMs += other.verifyMs;
+    extendMs += other.extendMs;
+    writeMs += other.writeMs;
+    return *this;
+}
+
+std::vector<LevelSummary> summarizeLevels(const BrickTree& tree, const BrickStore& store) {
+    std::vector<LevelSummary> levels(std::size_t(tree.levelCount()));
+    const std::int64_t brickPoints = std::int64_t(tree.brickCells()) * tree.brickCells() * tree.brickCells();
+    for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+        LevelSummary& level = levels[std::size_t(tree.leaves()[leaf].level)];
+        ++level.bricks;
+        level.storedPoints += brickPoints;
+        if (store.leafCount() == 0) continue;
+        for (int t = 0; t < store.tileCount(); ++t)
+            if (const Tile* tile = store.tile(leaf, t))
+                for (const std::uint64_t word : tile->coverage) level.coveredPoints += std::popcount(word);
+    }
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+        levels[l].level = int(l);
+        levels[l].spacingWorld = tree.spacingWorld(int(l));
+    }
+    return levels;
+}
+
+std::vector<FieldSummary> summarizeFields(const TetMesh& mesh) {
+    std::vector<FieldSummary> summaries;
+    for (const Field& field : mesh.fields) {
+        FieldSummary summary{field.name, field.location == FieldLocation::point ? "point" : "cell", {}};
+        for (int c = 0; c < field.components; ++c) summary.ranges.push_back(fieldRange(field, c));
+        summaries.push_back(std::move(summary));
+    }
+    return summaries;
+}
+
+Json meshJson(const ImportStatistics& s, const Box3d& bounds, const std::vector<FieldSummary>& fields) {
+    return {{"format", s.format},
+            {"nodes", s.nodes},
+            {"elements", s.elements},
+            {"cells", s.cells},
+            {"skipped_cells", s.skippedCells},
+            {"blanked_cells", s.blankedCells},
+            {"higher_order_cells", s.higherOrderCells},
+            {"blocks", s.blocks},
+            {"added_nodes", s.addedNodes},
+            {"flat_elements", s.flat},
+            {"inverted_elements", s.inverted},
+            {"duplicate_elements", s.duplicate},
+            {"coincident_nodes", s.coincidentNodes},
+            {"boundary_faces", s.boundaryFaces},
+            {"non_conforming_faces", s.nonConformingFaces},
+            {"edge_range", {s.smallestEdgeWorld, s.largestEdgeWorld}},
+            {"volume_range", {s.smallestVolumeWorld, s.largestVolumeWorld}},
+            {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}},
+            {"fields", fieldsJson(fields)},
+            {"warnings", s.warnings}};
+}
+
+Json levelsJson(const BrickTree& tree, const std::vector<LevelSummary>& levels) {
+    Json bricks = Json::array(), stored = Json::array(), covered = Json::array(), spacings = Json::array();
+    std::int64_t allStored = 0, allCovered = 0;
+    for (const LevelSummary& level : levels) {
+        bricks.push_back(level.bricks);
+        stored.push_back(level.storedPoints);
+        covered.push_back(level.coveredPoints);
+        spacings.push_back(level.spacingWorld);
+        allStored += level.storedPoints;
+        allCovered += level.coveredPoints;
+    }
+    return {{"lattice",
+             {{"origin", vectorJson(tree.originWorld())},
+              {"spacing", tree.spacingWorld()},
+              {"brick_cells", tree.brickCells()},
+              {"levels", tree.levelCount()},
+              {"spacing_per_level", spacings}}},
+            {"bricks", {{"total", tree.leafCount()}, {"per_level", bricks}}},
+            {"voxels",
+             {{"total", allStored}, {"per_level", stored}, {"covered_total", allCovered}, {"covered_per_level", covered}}}};
+}
+
+Json coverageJson(const ErrorReport& report) {
+    Json json = Json::parse(reportToJson(report));
+    json.erase("fields");
+    return json;
+}
+
+Json errorJson(const ErrorReport& report) {
+    Json json = Json::object();
+    for (Json& field : Json::parse(reportToJson(report))["fields"]) {
+        const std::string name = field["name"];
+        field.erase("name");
+        json[name] = std::move(field);
+    }
+    return json;
+}
+
+Json stagesJson(const StageTimes& t) {
+    return {{"read", t.readMs},     {"plan", t.planMs},     {"resample", t.resampleMs},
+            {"verify", t.verifyMs}, {"extend", t.extendMs}, {"write", t.writeMs}};
+}
+
+Json statisticsJson(const ResampleStatistics& s) {
+    return {{"element_block_pairs", s.elementBlockPairs}, {"exact_elements", s.exactElements}, {"scanlines", s.scanlines},
+            {"contested_points", s.contested},            {"covered_points", s.coveredPoints}, {"bin_ms", s.binMs},
+            {"sample_ms", s.sampleMs}};
+}
+
+Json writeResultJson(const VdbWriteResult& w) {
+    return {{"active_voxels", w.activeVoxels}, {"file_bytes", w.fileBytes}, {"flat_level", w.flatLevel},
+            {"unit_scale", w.unitScale},       {"notes", w.notes}};
+}
+
+Json seriesJson(std::size_t steps, const Box3d& bounds, const std::vector<FieldSummary>& fields) {
+    return {{"steps", steps}, {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}}, {"fields", fieldsJson(fields)}};
+}
+
+Json estimateJson(const PlanEstimate& e, double levelsMs, double flatMs) {
+    return {{"bricks_per_level", e.bricksPerLevel},
+            {"levels", {{"voxels", e.storedPoints}, {"bytes", e.levelsBytes}, {"predicted_ms", levelsMs}}},
+            {"flat", {{"voxels", e.flatPoints}, {"bytes", e.flatBytes}, {"predicted_ms", flatMs}}}};
+}
+
+void writeJson(const std::string& path, const Json& document) {
+    // Field names come from files and need not be UTF-8.
+    const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    if (path == "-") {
+        if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
+            throw IoError(fmt::format("standard output: {}", std::strerror(errno)));
+        return;
+    }
+    writeFileAtomically(path, text);
+}
+
+}  // namespace tessera

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "brick/refine.h"
+#include "io/read_mesh.h"
+#include "io/vdb_file.h"
+
+namespace tessera {
+
+using Json = nlohmann::ordered_json;
+
+/// Wall milliseconds of one run, stage by stage.
+struct StageTimes {
+    double readMs = 0, planMs = 0, resampleMs = 0, verifyMs = 0, extendMs = 0, writeMs = 0;
+    StageTimes& operator+=(const StageTimes& other);
+};
+
+/// What one level of the output holds.
+struct LevelSummary {
+    int level = 0;
+    double spacingWorld = 0;
+    std::int64_t bricks = 0;
+    std::int64_t storedPoints = 0;    ///< bricks x B^3
+    std::int64_t coveredPoints = 0;   ///< of these, in the mesh
+};
+std::vector<LevelSummary> summarizeLevels(const BrickTree& tree, const BrickStore& store);
+
+/// Finite range of one component of one field.
+struct FieldSummary {
+    std::string name, location;
+    std::vector<ValueRange> ranges;   ///< one a component
+};
+std::vector<FieldSummary> summarizeFields(const TetMesh& mesh);
+
+Json meshJson(const ImportStatistics& statistics, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
+Json levelsJson(const BrickTree& tree, const std::vector<LevelSummary>& levels);
+/// Counts of covered points and of samples.
+Json coverageJson(const ErrorReport& report);
+/// One entry a field, by name.
+Json errorJson(const ErrorReport& report);
+Json stagesJson(const StageTimes& times);
+Json statisticsJson(const ResampleStatistics& statistics);
+Json writeResultJson(const VdbWriteResult& written);
+/// What the steps of a time series share.
+Json seriesJson(std::size_t steps, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
+Json estimateJson(const PlanEstimate& estimate, double levelsMs, double flatMs);
+
+/// Writes the document to `path` (nothing stands there until it is whole), or to standard output for "-". Throws IoError.
+void writeJson(const std::string& path, const Json& document);
+
+}  // namespace tessera

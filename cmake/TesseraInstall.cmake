@@ -1,0 +1,23 @@
+# `cmake --install`: headers under include/tessera/<layer>/, static libraries, the command line and package files, so that another project can say
+# find_package(Tessera) and link Tessera::brick, Tessera::io, ...
+include(CMakePackageConfigHelpers)
+
+set(TESSERA_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Tessera)
+get_property(layers GLOBAL PROPERTY TESSERA_LAYERS)
+foreach(layer IN LISTS layers)
+  install(TARGETS tessera_${layer} EXPORT TesseraTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/${layer} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tessera
+    FILES_MATCHING PATTERN "*.h")
+endforeach()
+if(TARGET tessera)
+  install(TARGETS tessera RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+install(EXPORT TesseraTargets NAMESPACE Tessera:: DESTINATION ${TESSERA_CMAKE_DIR})
+configure_package_config_file(cmake/TesseraConfig.cmake.in ${PROJECT_BINARY_DIR}/TesseraConfig.cmake
+  INSTALL_DESTINATION ${TESSERA_CMAKE_DIR})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/TesseraConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+# The package file finds the same dependencies in the same order, so it runs the very file that the build runs.
+install(FILES ${PROJECT_BINARY_DIR}/TesseraConfig.cmake ${PROJECT_BINARY_DIR}/TesseraConfigVersion.cmake
+  cmake/TesseraDependencies.cmake DESTINATION ${TESSERA_CMAKE_DIR})

@@ -1,0 +1,39 @@
+# One target a folder: tessera_layer(<name> SOURCES ... LINK <layers> PRIVATE_LINK <libraries> PUBLIC_LINK <libraries>).
+# The LINK list of a layer is its row in docs/architecture.md; tests/layering_test.py compares the includes with it.
+
+add_library(tessera_flags INTERFACE)
+target_compile_options(tessera_flags INTERFACE
+  -ffp-contract=off -Wall -Wextra -Wshadow -Wconversion $<$<BOOL:${TESSERA_WERROR}>:-Werror>)
+if(TESSERA_SANITIZE)
+  target_compile_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE})
+endif()
+
+set_property(GLOBAL PROPERTY TESSERA_LAYERS "")
+
+function(tessera_layer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PUBLIC_LINK;PRIVATE_LINK" ${ARGN})
+  add_library(tessera_${name} STATIC ${ARG_SOURCES})
+  add_library(Tessera::${name} ALIAS tessera_${name})
+  set_target_properties(tessera_${name} PROPERTIES EXPORT_NAME ${name})
+  target_compile_features(tessera_${name} PUBLIC cxx_std_20)
+  target_include_directories(tessera_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tessera>)
+  foreach(layer IN LISTS ARG_LINK)
+    target_link_libraries(tessera_${name} PUBLIC tessera_${layer})
+  endforeach()
+  target_link_libraries(tessera_${name} PUBLIC ${ARG_PUBLIC_LINK} PRIVATE ${ARG_PRIVATE_LINK}
+    $<BUILD_INTERFACE:tessera_flags>)
+  set_property(GLOBAL APPEND PROPERTY TESSERA_LAYERS ${name})
+endfunction()
+
+function(tessera_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_compile_features(${name} PRIVATE cxx_std_20)
+  foreach(layer IN LISTS ARG_LINK)
+    target_link_libraries(${name} PRIVATE tessera_${layer})
+  endforeach()
+  target_link_libraries(${name} PRIVATE ${ARG_PRIVATE_LINK} tessera_flags)
+endfunction()

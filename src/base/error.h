@@ -1,0 +1,44 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace tessera {
+
+/// Bad input or usage: the message names the file, element or option, what was expected and what came.
+class InputError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// The environment failed: a file that can't be written, a full disk.
+class IoError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// OpenGL is absent or failed.
+class GlError : public std::runtime_error {
+  public:
+    using std::runtime_error::runtime_error;
+};
+
+/// The caller asked to stop (`Execution::cancel`).
+class Cancelled : public std::runtime_error {
+  public:
+    Cancelled() : std::runtime_error("cancelled") {}
+};
+
+/// A bug in Tessera itself, raised by TESSERA_CHECK.
+class InternalError : public std::logic_error {
+  public:
+    using std::logic_error::logic_error;
+};
+
+[[noreturn]] void throwInternalError(const char* condition, const char* file, int line, const std::string& note);
+
+}  // namespace tessera
+
+/// Always on: throws InternalError with the place when `condition` is false.
+#define TESSERA_CHECK(condition, note) \
+    ((condition) ? void(0) : ::tessera::throwInternalError(#condition, __FILE__, __LINE__, (note)))

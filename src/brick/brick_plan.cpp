@@ -1,0 +1,304 @@
+#include "brick/brick_plan.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <tuple>
+
+#include "base/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::int64_t kElementChunk = 16384;
+constexpr double kDenseLimit = double(1 << 25);   // bricks of a dense grid of marks
+
+// Keeps every brick whose samples a place inside the bounds can need: cell corners reach one voxel out, and those of the coarse cells that
+// a border is interpolated from twice that.
+bool insideBounds(const BrickKey& key, const PlanFrame& frame) {
+    if (!frame.boundsWorld) return true;
+    const double h = frame.spacingWorld(key.level);
+    const Vec3d low = (frame.boundsWorld->min - frame.originWorld) / h - 2.0;
+    const Vec3d high = (frame.boundsWorld->max - frame.originWorld) / h + 2.0;
+    const Vec3d first = Vec3d(key.index) * double(frame.brickCells);
+    const Vec3d last = first + double(frame.brickCells);
+    return first.x <= high.x && first.y <= high.y && first.z <= high.z && last.x >= low.x && last.y >= low.y &&
+           last.z >= low.z;
+}
+
+// Bricks [min, max] whose touch boxes may meet a box in index space.
+struct BrickRange {
+    Vec3i min, max;
+};
+
+BrickRange bricksMeeting(const Box3d& index, int brickCells) {
+    const double inverse = 1.0 / brickCells;
+    return {Vec3i(glm::floor(index.min * inverse)), Vec3i(glm::floor((index.max + kBrickSlackVoxels) * inverse))};
+}
+
+Box3d boundsInIndexSpace(const TetMesh& mesh, const PlanFrame& frame, int depth) {
+    const Box3d world = mesh.boundsWorld();
+    const double inverse = 1.0 / frame.spacingWorld(depth);
+    return {(world.min - frame.originWorld) * inverse, (world.max - frame.originWorld) * inverse};
+}
+
+BrickRange clippedRange(const TetMesh& mesh, const PlanFrame& frame, int depth) {
+    Box3d box = boundsInIndexSpace(mesh, frame, depth);
+    if (frame.boundsWorld) {
+        const double inverse = 1.0 / frame.spacingWorld(depth);
+        box.min = glm::max(box.min, (frame.boundsWorld->min - frame.originWorld) * inverse - 2.0 - frame.brickCells);
+        box.max = glm::min(box.max, (frame.boundsWorld->max - frame.originWorld) * inverse + 2.0 + frame.brickCells);
+    }
+    return bricksMeeting(box, frame.brickCells);
+}
+
+double rangeCount(const BrickRange& range) {
+    const Vec3d n = Vec3d(range.max) - Vec3d(range.min) + 1.0;
+    return n.x < 1 || n.y < 1 || n.z < 1 ? 0 : n.x * n.y * n.z;
+}
+
+}  // namespace
+
+double PlanFrame::spacingWorld(int depth) const { return std::ldexp(rootSpacingWorld, -depth); }
+
+Box3d brickTouchBox(const BrickKey& key, int brickCells) {
+    const Vec3d first = Vec3d(key.index) * double(brickCells);
+    return {first - kBrickSlackVoxels, first + double(brickCells)};
+}
+
+std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
+                                         double spacingWorld) {
+    const double inverse = 1.0 / spacingWorld;
+    std::array<Vec3d, 4> nodes;
+    const auto& tet = mesh.tets[std::size_t(element)];
+    for (std::size_t i = 0; i < 4; ++i) nodes[i] = (mesh.points[std::size_t(tet[i])] - originWorld) * inverse;
+    return nodes;
+}
+
+BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution)
+    : mesh_(&mesh), frame_(frame) {
+    allocateRoots(execution);
+}
+
+void BrickPlan::allocateRoots(const Execution& execution) {
+    const double spacing = frame_.spacingWorld(0);
+    const std::int64_t count = mesh_->elementCount();
+    std::vector<std::vector<std::pair<BrickKey, std::int32_t>>> found(
+        std::size_t((count + kElementChunk - 1) / kElementChunk));
+    parallelForChunks(execution, count, kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+        auto& list = found[std::size_t(begin / kElementChunk)];
+        for (std::int64_t e = begin; e < end; ++e) {
+            const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
+            const BrickRange range = bricksMeeting(element.bounds(), frame_.brickCells);
+            const bool single = range.min == range.max;
+            for (int z = range.min.z; z <= range.max.z; ++z)
+                for (int y = range.min.y; y <= range.max.y; ++y)
+                    for (int x = range.min.x; x <= range.max.x; ++x) {
+                        const BrickKey key{0, {x, y, z}};
+                        if (!insideBounds(key, frame_)) continue;
+                        const Box3d box = brickTouchBox(key, frame_.brickCells);
+                        if (single ? element.boundsTouch(box) : element.touches(box))
+                            list.emplace_back(key, std::int32_t(e));
+                    }
+        }
+    });
+    for (const auto& list : found)
+        for (const auto& [key, element] : list) {
+            const auto [slot, fresh] = at_.try_emplace(key, std::int64_t(bricks_.size()));
+            if (fresh) bricks_.emplace_back().key = key;
+            bricks_[std::size_t(slot->second)].elements.push_back(element);
+        }
+    leafCount_ = bricks_.size();
+}
+
+std::vector<PlannedBrick*> BrickPlan::leaves() {
+    std::vector<PlannedBrick*> result;
+    result.reserve(leafCount_);
+    for (PlannedBrick& brick : bricks_)
+        if (brick.key.level >= 0) result.push_back(&brick);
+    std::sort(result.begin(), result.end(), [](const PlannedBrick* a, const PlannedBrick* b) {
+        const Vec3i &i = a->key.index, &j = b->key.index;
+        return std::tie(a->key.level, i.z, i.y, i.x) < std::tie(b->key.level, j.z, j.y, j.x);
+    });
+    return result;
+}
+
+int BrickPlan::deepest() const {
+    int depth = 0;
+    for (const PlannedBrick& brick : bricks_) depth = std::max(depth, brick.key.level);
+    return depth;
+}
+
+std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
+    const int depth = brick.key.level + 1;
+    const double spacing = frame_.spacingWorld(depth);
+    std::vector<PlannedBrick> made(8);
+    std::array<Box3d, 8> boxes;
+    std::array<bool, 8> allowed;
+    for (int c = 0; c < 8; ++c) {
+        made[std::size_t(c)].key = {depth, brick.key.index * 2 + Vec3i(c & 1, (c >> 1) & 1, c >> 2)};
+        boxes[std::size_t(c)] = brickTouchBox(made[std::size_t(c)].key, frame_.brickCells);
+        allowed[std::size_t(c)] = insideBounds(made[std::size_t(c)].key, frame_);
+    }
+    for (const std::int32_t e : brick.elements) {
+        const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
+        std::array<std::size_t, 8> hits;
+        std::size_t count = 0;
+        for (std::size_t c = 0; c < 8; ++c)
+            if (allowed[c] && element.boundsTouch(boxes[c])) hits[count++] = c;
+        for (std::size_t i = 0; i < count; ++i)
+            if (element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
+    }
+    splitSamples(brick, made);
+    std::erase_if(made, [](const PlannedBrick& child) { return child.elements.empty(); });
+    return made;
+}
+
+void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick>& made) const {
+    if (brick.samples.empty()) return;
+    const double inverse = 1.0 / (frame_.spacingWorld(brick.key.level) * frame_.brickCells);
+    const Vec3d middle = Vec3d(brick.key.index) + 0.5;
+    for (const std::uint32_t sample : brick.samples) {
+        const Vec3d place = (placeOfSample(sample) - frame_.originWorld) * inverse;
+        std::size_t child = std::size_t((place.x >= middle.x ? 1 : 0) | (place.y >= middle.y ? 2 : 0) |
+                                        (place.z >= middle.z ? 4 : 0));
+        // Rounding can put a sample just across the middle, where no element reaches: any child that touches it serves.
+        for (std::size_t other = 0; made[child].elements.empty() && other < 8; ++other)
+            if (!made[other].elements.empty()) child = other;
+        made[child].samples.push_back(sample);
+    }
+}
+
+void BrickPlan::replace(const BrickKey& key, std::vector<PlannedBrick> made) {
+    const auto slot = at_.find(key);
+    TESSERA_CHECK(slot != at_.end() && slot->second >= 0, "only a leaf is split");
+    splitSlots_.push_back(slot->second);
+    // The split brick keeps its contents for undo(); a negative depth marks it as no leaf.
+    bricks_[std::size_t(slot->second)].key.level = -1 - key.level;
+    slot->second = kInner;
+    for (PlannedBrick& child : made) {
+        at_.emplace(child.key, std::int64_t(bricks_.size()));
+        bricks_.push_back(std::move(child));
+    }
+    leafCount_ += made.size();
+    leafCount_ -= 1;
+}
+
+std::vector<BrickKey> BrickPlan::unbalanced(const std::vector<BrickKey>& fresh) const {
+    std::vector<BrickKey> coarse;
+    for (const BrickKey& key : fresh) {
+        if (key.level < 2) continue;
+        // The parents of the 26 neighbours are at most eight bricks: per axis the own parent and the one on the nearer side.
+        const Vec3i low{(key.index.x - 1) >> 1, (key.index.y - 1) >> 1, (key.index.z - 1) >> 1};
+        for (int c = 0; c < 8; ++c) {
+            BrickKey parent{key.level - 1, low + Vec3i(c & 1, (c >> 1) & 1, c >> 2)};
+            while (parent.level >= 0) {
+                const auto found = at_.find(parent);
+                if (found != at_.end()) {
+                    if (found->second >= 0 && parent.level < key.level - 1) coarse.push_back(parent);
+                    break;
+                }
+                parent = {parent.level - 1, {parent.index.x >> 1, parent.index.y >> 1, parent.index.z >> 1}};
+            }
+        }
+    }
+    std::sort(coarse.begin(), coarse.end(), [](const BrickKey& a, const BrickKey& b) {
+        return std::tie(a.level, a.index.z, a.index.y, a.index.x) < std::tie(b.level, b.index.z, b.index.y, b.index.x);
+    });
+    coarse.erase(std::unique(coarse.begin(), coarse.end()), coarse.end());
+    return coarse;
+}
+
+void BrickPlan::undo() {
+    for (std::size_t i = slotsBefore_; i < bricks_.size(); ++i) {
+        const int level = bricks_[i].key.level;
+        at_.erase(BrickKey{level >= 0 ? level : -1 - level, bricks_[i].key.index});
+    }
+    for (const std::int64_t slot : splitSlots_)
+        if (std::size_t(slot) < slotsBefore_) {
+            BrickKey& key = bricks_[std::size_t(slot)].key;
+            key.level = -1 - key.level;
+            at_[key] = slot;
+        }
+    bricks_.resize(slotsBefore_);
+}
+
+bool BrickPlan::split(const std::vector<BrickKey>& keys, std::size_t maxLeaves, const Execution& execution) {
+    splitSlots_.clear();
+    slotsBefore_ = bricks_.size();
+    const std::size_t leavesBefore = leafCount_;
+    std::vector<BrickKey> pending = keys, fresh;
+    while (!pending.empty()) {
+        std::vector<std::vector<PlannedBrick>> made(pending.size());
+        parallelFor(execution, std::int64_t(pending.size()), [&](std::int64_t i) {
+            made[std::size_t(i)] = children(bricks_[std::size_t(at_.at(pending[std::size_t(i)]))]);
+        });
+        for (std::size_t i = 0; i < pending.size(); ++i) {
+            for (const PlannedBrick& child : made[i]) fresh.push_back(child.key);
+            replace(pending[i], std::move(made[i]));
+        }
+        if (leafCount_ > maxLeaves) {
+            undo();
+            leafCount_ = leavesBefore;
+            return false;
+        }
+        // A split can unbalance others, and a brick stays a cause until its neighbours are fine enough.
+        pending = unbalanced(fresh);
+    }
+    for (const std::int64_t slot : splitSlots_) bricks_[std::size_t(slot)] = PlannedBrick{{-1, {}}, {}, {}, false, -1, 0};
+    std::erase_if(bricks_, [](const PlannedBrick& brick) { return brick.key.level < 0; });
+    for (std::size_t i = 0; i < bricks_.size(); ++i) at_[bricks_[i].key] = std::int64_t(i);
+    return true;
+}
+
+BrickTree BrickPlan::tree(int finestDepth) const {
+    const int finest = finestDepth >= 0 ? finestDepth : deepest();
+    std::vector<BrickKey> keys;
+    keys.reserve(bricks_.size());
+    for (const PlannedBrick& brick : bricks_) keys.push_back({finest - brick.key.level, brick.key.index});
+    return BrickTree(frame_.originWorld, frame_.spacingWorld(finest), frame_.brickCells, std::move(keys));
+}
+
+std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit,
+                           std::vector<BrickKey>* keys, const Execution& execution) {
+    const int depth = frame.maxDepth;
+    const BrickRange range = clippedRange(mesh, frame, depth);
+    if (rangeCount(range) > kDenseLimit) return -1;
+    const Vec3i n = range.max - range.min + 1;
+    std::vector<std::uint8_t> marks(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z), 0);
+    const double spacing = frame.spacingWorld(depth);
+    const auto markAt = [&](int x, int y, int z) {
+        return std::atomic_ref<std::uint8_t>(
+            marks[(std::size_t(z - range.min.z) * std::size_t(n.y) + std::size_t(y - range.min.y)) * std::size_t(n.x) +
+                  std::size_t(x - range.min.x)]);
+    };
+    parallelForChunks(execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t e = begin; e < end; ++e) {
+            const ElementOverlap element(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
+            const BrickRange own = bricksMeeting(element.bounds(), frame.brickCells);
+            const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
+            for (int z = low.z; z <= high.z; ++z)
+                for (int y = low.y; y <= high.y; ++y)
+                    for (int x = low.x; x <= high.x; ++x) {
+                        // Most bricks are marked already by an earlier element: the exact test runs rarely.
+                        auto mark = markAt(x, y, z);
+                        if (mark.load(std::memory_order_relaxed)) continue;
+                        const BrickKey key{depth, {x, y, z}};
+                        if (element.touches(brickTouchBox(key, frame.brickCells)) && insideBounds(key, frame))
+                            mark.store(1, std::memory_order_relaxed);
+                    }
+        }
+    });
+    std::int64_t count = 0;
+    for (const std::uint8_t mark : marks) count += mark;
+    if (!keys || count > limit) return count;
+    keys->reserve(std::size_t(count));
+    for (int z = range.min.z; z <= range.max.z; ++z)
+        for (int y = range.min.y; y <= range.max.y; ++y)
+            for (int x = range.min.x; x <= range.max.x; ++x)
+                if (markAt(x, y, z).load(std::memory_order_relaxed)) keys->push_back({0, {x, y, z}});
+    return count;
+}
+
+}  // namespace tessera

@@ -1,0 +1,176 @@
+#include "brick/brick_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <tuple>
+
+#include "base/error.h"
+
+namespace tessera {
+
+std::size_t BrickKeyHash::operator()(const BrickKey& key) const {
+    // Multiplicative mixing of the four integers; the last shift brings the high bits down to where tables look.
+    std::uint64_t h = std::uint64_t(std::uint32_t(key.level)) * 0x9e3779b97f4a7c15ull;
+    for (const int v : {key.index.x, key.index.y, key.index.z})
+        h = (h ^ std::uint64_t(std::uint32_t(v))) * 0x9fb21c651e98df25ull, h ^= h >> 29;
+    return std::size_t(h ^ (h >> 32));
+}
+
+namespace {
+
+bool storageOrder(const BrickKey& a, const BrickKey& b) {
+    return std::tie(a.level, a.index.z, a.index.y, a.index.x) < std::tie(b.level, b.index.z, b.index.y, b.index.x);
+}
+
+// Arithmetic shifts round towards minus infinity, as floor division by a power of two does.
+Vec3i ancestorIndex(const Vec3i& index, int levels) {
+    if (levels > 31) levels = 31;
+    return {index.x >> levels, index.y >> levels, index.z >> levels};
+}
+
+std::size_t childOf(const Vec3i& index) {
+    return std::size_t((index.x & 1) | (index.y & 1) << 1 | (index.z & 1) << 2);
+}
+
+}  // namespace
+
+BrickTree::BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells, std::vector<BrickKey> leaves)
+    : origin_(originWorld), spacing_(spacingWorld), brickCells_(brickCells), leaves_(std::move(leaves)) {
+    TESSERA_CHECK(brickCells > 0 && std::has_single_bit(unsigned(brickCells)), "a brick has a power of two of cells");
+    TESSERA_CHECK(spacingWorld > 0, "a brick tree needs a spacing");
+    std::sort(leaves_.begin(), leaves_.end(), storageOrder);
+    if (leaves_.empty()) return;
+    TESSERA_CHECK(leaves_.front().level >= 0, "levels count from 0");
+    levelCount_ = leaves_.back().level + 1;
+    layOutRoots();
+    for (std::size_t i = 0; i < leaves_.size(); ++i) insert(std::int32_t(i));
+}
+
+void BrickTree::layOutRoots() {
+    Vec3i last{0};
+    bool first = true;
+    for (const BrickKey& key : leaves_) {
+        const Vec3i root = ancestorIndex(key.index, levelCount_ - 1 - key.level);
+        rootMin_ = first ? root : glm::min(rootMin_, root);
+        last = first ? root : glm::max(last, root);
+        first = false;
+    }
+    rootSize_ = last - rootMin_ + 1;
+    const double cells = double(rootSize_.x) * double(rootSize_.y) * double(rootSize_.z);
+    if (cells <= std::max(65536.0, 16.0 * double(leaves_.size())))
+        denseRoots_.assign(std::size_t(cells), kAbsent);
+    else
+        rootSize_ = Vec3i(0);
+}
+
+std::int32_t BrickTree::rootEntry(const Vec3i& index) const {
+    if (denseRoots_.empty()) {
+        const auto found = sparseRoots_.find(BrickKey{0, index});
+        return found == sparseRoots_.end() ? kAbsent : found->second;
+    }
+    // Unsigned comparison rejects what lies below the grid too.
+    const std::uint32_t x = std::uint32_t(index.x) - std::uint32_t(rootMin_.x);
+    const std::uint32_t y = std::uint32_t(index.y) - std::uint32_t(rootMin_.y);
+    const std::uint32_t z = std::uint32_t(index.z) - std::uint32_t(rootMin_.z);
+    if (x >= std::uint32_t(rootSize_.x) || y >= std::uint32_t(rootSize_.y) || z >= std::uint32_t(rootSize_.z))
+        return kAbsent;
+    return denseRoots_[(std::size_t(z) * std::size_t(rootSize_.y) + y) * std::size_t(rootSize_.x) + x];
+}
+
+std::int32_t& BrickTree::rootSlot(const Vec3i& index) {
+    if (denseRoots_.empty()) return sparseRoots_.try_emplace(BrickKey{0, index}, kAbsent).first->second;
+    const Vec3i q = index - rootMin_;
+    return denseRoots_[(std::size_t(q.z) * std::size_t(rootSize_.y) + std::size_t(q.y)) *
+                           std::size_t(rootSize_.x) + std::size_t(q.x)];
+}
+
+void BrickTree::insert(std::int32_t leaf) {
+    const BrickKey& key = leaves_[std::size_t(leaf)];
+    int level = levelCount_ - 1;
+    std::int32_t* slot = &rootSlot(ancestorIndex(key.index, level - key.level));
+    while (level > key.level) {
+        TESSERA_CHECK(*slot < 0, "a leaf brick lies inside another");
+        std::size_t position = inner_.size();
+        if (*slot == kAbsent) {
+            *slot = innerEntry(position);
+            inner_.emplace_back().fill(kAbsent);
+        } else {
+            position = innerPosition(*slot);
+        }
+        --level;
+        slot = &inner_[position][childOf(ancestorIndex(key.index, level - key.level))];
+    }
+    TESSERA_CHECK(*slot == kAbsent, "two leaf bricks overlap");
+    *slot = leaf;
+}
+
+double BrickTree::spacingWorld(int level) const { return std::ldexp(spacing_, level); }
+
+Lattice BrickTree::lattice(int level) const { return Lattice::axisParallel(origin_, spacingWorld(level)); }
+
+IndexBox BrickTree::ownedPoints(const BrickKey& key) const {
+    return {key.index * brickCells_, key.index * brickCells_ + brickCells_};
+}
+
+IndexBox BrickTree::closedPoints(const BrickKey& key) const {
+    return {key.index * brickCells_, key.index * brickCells_ + (brickCells_ + 1)};
+}
+
+std::int32_t BrickTree::descend(const BrickKey& key, int& level) const {
+    level = levelCount_ - 1;
+    if (key.level > level || key.level < 0) return kAbsent;
+    std::int32_t entry = rootEntry(ancestorIndex(key.index, level - key.level));
+    while (level > key.level && entry < kAbsent) {
+        --level;
+        entry = inner_[innerPosition(entry)][childOf(ancestorIndex(key.index, level - key.level))];
+    }
+    return entry;
+}
+
+std::int64_t BrickTree::findLeaf(const BrickKey& key) const {
+    int level = 0;
+    const std::int32_t entry = descend(key, level);
+    return entry >= 0 && level == key.level ? entry : -1;
+}
+
+std::int64_t BrickTree::findCovering(const BrickKey& key) const {
+    int level = 0;
+    const std::int32_t entry = descend(key, level);
+    return entry >= 0 ? entry : -1;
+}
+
+bool BrickTree::isRefined(const BrickKey& key) const {
+    if (key.level >= levelCount_)
+        return std::any_of(leaves_.begin(), leaves_.end(), [&](const BrickKey& leaf) {
+            return ancestorIndex(leaf.index, key.level - leaf.level) == key.index;
+        });
+    int level = 0;
+    return descend(key, level) < kAbsent;
+}
+
+std::int64_t BrickTree::findLeafAt(const Vec3d& index0) const {
+    const Vec3d floored = glm::floor(index0);
+    constexpr double kLimit = 2147483647.0;
+    if (!(std::abs(floored.x) < kLimit && std::abs(floored.y) < kLimit && std::abs(floored.z) < kLimit)) return -1;
+    return findLeafAt(0, Vec3i(floored));
+}
+
+std::int64_t BrickTree::findLeafAt(int level, const Vec3i& p) const {
+    if (levelCount_ == 0) return -1;
+    // 64 bits: a coarse lattice's far corner, counted in points of level 0, may pass 2^31.
+    const std::int64_t x = std::int64_t(p.x) << level, y = std::int64_t(p.y) << level, z = std::int64_t(p.z) << level;
+    const int shift = std::countr_zero(unsigned(brickCells_));
+    const auto brickAt = [&](int l) {
+        return Vec3i(int(x >> (shift + l)), int(y >> (shift + l)), int(z >> (shift + l)));
+    };
+    int l = levelCount_ - 1;
+    std::int32_t entry = rootEntry(brickAt(l));
+    while (entry < kAbsent) {
+        --l;
+        entry = inner_[innerPosition(entry)][childOf(brickAt(l))];
+    }
+    return entry >= 0 ? entry : -1;
+}
+
+}  // namespace tessera

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "lattice/lattice.h"
+
+namespace tessera {
+
+/// A brick of brickCells^3 cells of one level. It owns the lattice points [index * B, index * B + B) of that level (half-open); its closed box has
+/// B + 1 points along each axis. Level 0 is the finest; level l + 1 has every second lattice point of level l, so
+/// brick (l, b) is the union of the eight bricks (l - 1, 2 b + {0, 1}).
+struct BrickKey {
+    int level = 0;
+    Vec3i index{0};
+    friend bool operator==(const BrickKey&, const BrickKey&) = default;
+};
+
+struct BrickKeyHash {
+    std::size_t operator()(const BrickKey& key) const;
+};
+
+/// The leaf bricks over a mesh: disjoint, and any two whose closed boxes touch (26 neighbours) differ by at most one level. Space
+/// that no element touches has no brick.
+class BrickTree {
+  public:
+    BrickTree() = default;
+    /// @param spacingWorld h_0, the spacing of level 0. @param leaves in any order; stored ascending by level, z, y, x.
+    /// Throws InternalError when leaves overlap.
+    BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells, std::vector<BrickKey> leaves);
+
+    const Vec3d& originWorld() const { return origin_; }
+    double spacingWorld(int level = 0) const;
+    int brickCells() const { return brickCells_; }
+    /// 1 + the coarsest level present; 0 for an empty tree.
+    int levelCount() const { return levelCount_; }
+    std::span<const BrickKey> leaves() const { return leaves_; }
+    std::size_t leafCount() const { return leaves_.size(); }
+
+    Lattice lattice(int level) const;
+    IndexBox ownedPoints(const BrickKey& key) const;
+    IndexBox closedPoints(const BrickKey& key) const;
+
+    /// Position of exactly this key among the leaves, or -1.
+    std::int64_t findLeaf(const BrickKey& key) const;
+    /// The leaf that is `key` or contains it (a coarser one), or -1.
+    std::int64_t findCovering(const BrickKey& key) const;
+    /// True when `key` itself isn't a leaf but leaves lie inside it.
+    bool isRefined(const BrickKey& key) const;
+    /// The leaf whose half-open box of cells contains the place, given in index space of level 0, or -1.
+    std::int64_t findLeafAt(const Vec3d& index0) const;
+    /// The leaf, of any level, whose half-open box contains lattice point `p` of `level`, or -1.
+    std::int64_t findLeafAt(int level, const Vec3i& p) const;
+
+  private:
+    // Children of an inner brick, child (x & 1) | (y & 1) << 1 | (z & 1) << 2. An entry is a leaf's position, kAbsent, or an inner
+    // brick coded as innerEntry(position in inner_).
+    using Children = std::array<std::int32_t, 8>;
+    static constexpr std::int32_t kAbsent = -1;
+    static constexpr std::int32_t innerEntry(std::size_t position) { return -2 - std::int32_t(position); }
+    static constexpr std::size_t innerPosition(std::int32_t entry) { return std::size_t(-2 - entry); }
+
+    void layOutRoots();
+    void insert(std::int32_t leaf);
+    std::int32_t rootEntry(const Vec3i& index) const;
+    std::int32_t& rootSlot(const Vec3i& index);
+    /// The entry at `key`, or the leaf above it; `level` receives the level of what was found.
+    std::int32_t descend(const BrickKey& key, int& level) const;
+
+    Vec3d origin_{0};
+    double spacing_ = 1;
+    int brickCells_ = 16;
+    int levelCount_ = 0;
+    std::vector<BrickKey> leaves_;
+    std::vector<Children> inner_;
+    // Bricks of the coarsest level present: a dense grid over their box, or a map when that would be mostly empty.
+    Vec3i rootMin_{0};
+    Vec3i rootSize_{0};
+    std::vector<std::int32_t> denseRoots_;
+    std::unordered_map<BrickKey, std::int32_t, BrickKeyHash> sparseRoots_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/execution.h"
+#include "brick/brick_store.h"
+#include "brick/brick_tree.h"
+#include "brick/error_report.h"
+#include "mesh/nearest_point.h"
+#include "mesh/tet_mesh.h"
+
+namespace tessera {
+
+struct MeasureOptions {
+    /// When not null: receives the largest relative error of any field in each leaf (drives refinement), leafCount entries.
+    std::vector<double>* leafErrors = nullptr;
+};
+
+/// Measures trilinear reconstruction against the exact field. A lattice corner outside the mesh takes the value at the nearest mesh
+/// point; across a change of level the border is interpolated from the coarse brick (docs/algorithms.md, Seams).
+/// @param fields indices into mesh.fields whose components are the store's channels, in this order.
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
+                         const NearestPointIndex& nearest, const Execution& execution, const MeasureOptions& options = {});
+
+}  // namespace tessera

@@ -1,0 +1,59 @@
+#include "brick/overlap.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera {
+
+ElementOverlap::ElementOverlap(const std::array<Vec3d, 4>& nodes) : nodes_(nodes) {
+    for (const Vec3d& node : nodes) bounds_.include(node);
+}
+
+namespace {
+
+// Separates the corners, given relative to the box's centre, from the box of half size `half` along one axis. The tolerance covers
+// the rounding of the axis and of the projections.
+bool separates(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half) {
+    double low = glm::dot(axis, corners[0]), high = low;
+    double largest = std::abs(low);
+    for (int i = 1; i < 4; ++i) {
+        const double d = glm::dot(axis, corners[std::size_t(i)]);
+        low = std::min(low, d);
+        high = std::max(high, d);
+        largest = std::max(largest, std::abs(d));
+    }
+    const Vec3d size = glm::abs(axis);
+    const double radius = glm::dot(size, half);
+    const double scale = std::max({largest, radius, (size.x + size.y + size.z) * glm::length(corners[0])});
+    const double tolerance = 1e-12 * scale;
+    return low > radius + tolerance || high < -radius - tolerance;
+}
+
+}  // namespace
+
+bool ElementOverlap::touches(const Box3d& box) const {
+    if (!boundsTouch(box)) return false;
+    const Vec3d centre = 0.5 * (box.min + box.max);
+    const Vec3d half = 0.5 * (box.max - box.min);
+    std::array<Vec3d, 4> corners;
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = nodes_[i] - centre;
+    // A node well inside settles it.
+    for (const Vec3d& c : corners)
+        if (std::abs(c.x) < half.x && std::abs(c.y) < half.y && std::abs(c.z) < half.z) return true;
+    constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    for (const auto& f : kFaces) {
+        const Vec3d normal = glm::cross(corners[std::size_t(f[1])] - corners[std::size_t(f[0])],
+                                        corners[std::size_t(f[2])] - corners[std::size_t(f[0])]);
+        if (separates(normal, corners, half)) return false;
+    }
+    for (std::size_t a = 0; a < 4; ++a)
+        for (std::size_t b = a + 1; b < 4; ++b) {
+            const Vec3d edge = corners[b] - corners[a];
+            if (separates({0, -edge.z, edge.y}, corners, half) || separates({edge.z, 0, -edge.x}, corners, half) ||
+                separates({-edge.y, edge.x, 0}, corners, half))
+                return false;
+        }
+    return true;
+}
+
+}  // namespace tessera

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <streambuf>
+#include <string>
+#include <vector>
+
+#include "base/execution.h"
+
+namespace tessera {
+
+/// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory, which `commit` syncs and
+/// renames; without a commit the destructor removes it and whatever stood at the name stays as it was.
+class AtomicFile {
+  public:
+    /// Throws IoError when the directory is missing or not writable, or `path` names something that isn't a regular file.
+    explicit AtomicFile(const std::string& path);
+    ~AtomicFile();
+    AtomicFile(const AtomicFile&) = delete;
+    AtomicFile& operator=(const AtomicFile&) = delete;
+
+    /// Writes all bytes at an offset from the file's start. Throws IoError with the system's reason (disk full, ...).
+    void writeAt(std::int64_t offset, const void* bytes, std::size_t count);
+    /// Reads up to `count` bytes back; returns how many there were. Throws IoError.
+    std::size_t readAt(std::int64_t offset, void* bytes, std::size_t count) const;
+    std::int64_t size() const { return size_; }
+    /// Syncs, closes and renames to the final name. Throws IoError.
+    void commit();
+
+    const std::string& path() const { return path_; }
+    const std::string& temporaryPath() const { return temporaryPath_; }
+
+  private:
+    std::string path_;
+    std::string temporaryPath_;
+    int descriptor_ = -1;
+    int slot_ = -1;
+    std::int64_t size_ = 0;
+};
+
+/// Output side of a std::ostream over an AtomicFile. Throws IoError from the write that failed (set the stream's exceptions to badbit so
+/// that it passes through) and Cancelled when the caller asks to stop.
+class AtomicFileBuffer : public std::streambuf {
+  public:
+    AtomicFileBuffer(AtomicFile& file, const Execution& execution);
+    void flushAll();
+
+  protected:
+    int_type overflow(int_type c) override;
+    std::streamsize xsputn(const char* s, std::streamsize n) override;
+    int sync() override;
+    pos_type seekoff(off_type offset, std::ios_base::seekdir direction, std::ios_base::openmode) override;
+    pos_type seekpos(pos_type position, std::ios_base::openmode) override;
+
+  private:
+    AtomicFile* file_;
+    const Execution* execution_;
+    std::vector<char> buffer_;
+    std::int64_t bufferStart_ = 0;   // offset in the file of the buffer's first byte
+};
+
+/// Throws IoError at once when a file could not be written at `path`: missing directory, a directory or device of this name, no
+/// permission. Call it before long work.
+void checkWritable(const std::string& path);
+
+/// Writes a whole small file atomically. Throws IoError.
+void writeFileAtomically(const std::string& path, const std::string& bytes);
+
+/// Unlinks every temporary file that is open now. Async-signal-safe: for handlers of signals that end the process.
+void removeTemporaryFiles() noexcept;
+
+}  // namespace tessera

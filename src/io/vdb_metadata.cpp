@@ -1,0 +1,242 @@
+#include "io/vdb_metadata.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/error.h"
+#include "io/report_json.h"
+
+namespace tessera {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// OpenVDB 10 refuses a transform whose determinant is below 3e-15: voxels under 1.4423e-5.
+constexpr double kSmallestFileSpacing = 1.5e-5;
+constexpr double kComfortableFileSpacing = 2e-5;
+constexpr int kMaxLevels = 31;
+constexpr int kMaxIndex = 1 << 30;
+
+[[noreturn]] void damaged(const std::string& what) { throw InputError("damaged Tessera metadata: " + what); }
+
+const std::string& entry(const std::map<std::string, std::string>& entries, const std::string& key) {
+    const auto found = entries.find(key);
+    if (found == entries.end()) damaged("there is no " + key);
+    return found->second;
+}
+
+double readDouble(const std::string& text, const std::string& key) {
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size()) damaged(key + " is '" + text + "', not a number");
+    return value;
+}
+
+template <class Enum, std::size_t N>
+Enum readChoice(const std::string& text, const std::string& key, const std::array<std::pair<const char*, Enum>, N>& choices) {
+    for (const auto& [name, value] : choices) {
+        if (text == name) return value;
+    }
+    damaged(key + " is '" + text + "'");
+}
+
+constexpr std::array<std::pair<const char*, VdbLayout>, 2> kLayouts{{{"levels", VdbLayout::levels}, {"flat", VdbLayout::flat}}};
+constexpr std::array<std::pair<const char*, UpAxis>, 3> kUpAxes{{{"keep", UpAxis::keep}, {"y", UpAxis::y}, {"z", UpAxis::z}}};
+
+template <class Enum, std::size_t N>
+std::string choiceName(Enum value, const std::array<std::pair<const char*, Enum>, N>& choices) {
+    for (const auto& [name, choice] : choices) {
+        if (choice == value) return name;
+    }
+    throwInternalError("known choice", __FILE__, __LINE__, "an enumerator has no name");
+}
+
+std::string encodeTree(const BrickTree& tree) {
+    Json json;
+    json["origin"] = {tree.originWorld().x, tree.originWorld().y, tree.originWorld().z};
+    json["spacing"] = tree.spacingWorld(0);
+    json["brick_cells"] = tree.brickCells();
+    Json levels = Json::array();
+    for (int level = 0; level < tree.levelCount(); ++level) levels.push_back(Json::array());
+    for (const BrickKey& key : tree.leaves()) {
+        Json& list = levels[std::size_t(key.level)];
+        for (int axis = 0; axis < 3; ++axis) list.push_back(key.index[axis]);
+    }
+    json["levels"] = std::move(levels);
+    return json.dump();
+}
+
+BrickTree decodeTree(const std::string& text) {
+    const Json json = Json::parse(text);
+    Vec3d origin;
+    for (int axis = 0; axis < 3; ++axis) origin[axis] = json.at("origin").at(std::size_t(axis)).get<double>();
+    const double spacing = json.at("spacing").get<double>();
+    const int brickCells = json.at("brick_cells").get<int>();
+    if (!(spacing > 0) || !std::isfinite(spacing)) damaged("the spacing of the bricks isn't positive");
+    if (brickCells != 8 && brickCells != 16 && brickCells != 32 && brickCells != 64) damaged("bricks of " + std::to_string(brickCells) + " cells");
+    const Json& levels = json.at("levels");
+    if (levels.size() > kMaxLevels) damaged(std::to_string(levels.size()) + " levels");
+    std::vector<BrickKey> leaves;
+    for (std::size_t level = 0; level < levels.size(); ++level) {
+        const Json& list = levels[level];
+        if (list.size() % 3 != 0) damaged("the brick table isn't made of triples");
+        // Points of level 0 inside the brick must stay within the indices that a lattice can have.
+        const std::int64_t limit = kMaxIndex / (std::int64_t(brickCells) << level);
+        for (std::size_t i = 0; i < list.size(); i += 3) {
+            BrickKey key;
+            key.level = int(level);
+            for (int axis = 0; axis < 3; ++axis) {
+                const std::int64_t index = list[i + std::size_t(axis)].get<std::int64_t>();
+                if (index < -limit || index >= limit) damaged("brick index " + std::to_string(index) + " out of range");
+                key.index[axis] = int(index);
+            }
+            leaves.push_back(key);
+        }
+    }
+    try {
+        return BrickTree(origin, spacing, brickCells, std::move(leaves));
+    } catch (const InternalError& error) {
+        damaged(std::string("the brick table doesn't fit together: ") + error.what());
+    }
+}
+
+std::string encodeFields(const std::vector<OutputField>& fields) {
+    Json json = Json::array();
+    for (const OutputField& field : fields) {
+        Json grids = Json::array();
+        for (const GridPlan& grid : planGrids({field})) grids.push_back(grid.name);
+        json.push_back({{"name", field.name},
+                        {"source", field.sourceName},
+                        {"location", field.location},
+                        {"components", field.components},
+                        {"first_channel", field.firstChannel},
+                        {"grids", std::move(grids)}});
+    }
+    return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<OutputField> decodeFields(const std::string& text) {
+    const Json json = Json::parse(text);
+    std::vector<OutputField> fields;
+    int channels = 0;
+    for (const Json& entry : json) {
+        OutputField field;
+        entry.at("name").get_to(field.name);
+        entry.at("source").get_to(field.sourceName);
+        entry.at("location").get_to(field.location);
+        entry.at("components").get_to(field.components);
+        entry.at("first_channel").get_to(field.firstChannel);
+        if (field.components < 1 || field.components > 64) damaged("a field of " + std::to_string(field.components) + " components");
+        if (field.firstChannel != channels) damaged("the fields' channels don't follow each other");
+        channels += field.components;
+        fields.push_back(std::move(field));
+    }
+    return fields;
+}
+
+}  // namespace
+
+std::vector<GridPlan> planGrids(const std::vector<OutputField>& fields) {
+    std::vector<GridPlan> grids;
+    for (const OutputField& field : fields) {
+        if (field.components == 1 || field.components == 3) {
+            grids.push_back({field.name, field.name, field.components, field.firstChannel});
+            continue;
+        }
+        for (int c = 0; c < field.components; ++c)
+            grids.push_back({field.name + "_" + std::to_string(c), field.name, 1, field.firstChannel + c});
+    }
+    return grids;
+}
+
+std::string gridName(const std::string& base, VdbLayout layout, int level) {
+    return layout == VdbLayout::flat ? base : base + "_level_" + std::to_string(level);
+}
+
+void checkOutputFields(const std::vector<OutputField>& fields) {
+    std::set<std::string> names{"coverage"};
+    for (const GridPlan& grid : planGrids(fields)) {
+        if (grid.name.empty()) throw InputError("a grid needs a name: give the field another with --field name=newname");
+        // OpenVDB marks grids of equal names by this character, so it can't be part of one.
+        if (grid.name.find('\x1e') != std::string::npos) throw InputError("a grid's name can't hold the character 0x1e");
+        if (!names.insert(grid.name).second) {
+            throw InputError("two grids of the output would be named '" + grid.name + "': rename a field with --field " +
+                             grid.field + "=newname");
+        }
+    }
+}
+
+double chooseUnitScale(double finestSpacingWorld, double requested) {
+    if (requested != 0) {
+        if (!(requested > 0) || !std::isfinite(requested)) throw InputError("the unit scale must be a positive number");
+        if (finestSpacingWorld * requested < kSmallestFileSpacing) {
+            throw InputError("with unit scale " + exactText(requested) + " the finest voxel is " +
+                             exactText(finestSpacingWorld * requested) + " file units, and OpenVDB takes none below " +
+                             exactText(kSmallestFileSpacing) + ": give a larger --unit-scale");
+        }
+        return requested;
+    }
+    double scale = 1;
+    if (finestSpacingWorld >= kComfortableFileSpacing) return scale;
+    for (int power = 1; power <= 300 && finestSpacingWorld * scale < 1e-3; ++power)
+        scale = readDouble("1e" + std::to_string(power), "power of ten");
+    return scale;
+}
+
+std::string exactText(double value) {
+    std::array<char, 40> text{};
+    const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+    return std::string(text.data(), end);
+}
+
+std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
+    std::map<std::string, std::string> entries;
+    entries["tessera_format"] = std::to_string(kVdbFormat);
+    entries["tessera_version"] = metadata.version;
+    entries["tessera_source"] = metadata.sourceFile;
+    entries["tessera_algorithm"] = metadata.algorithm;
+    entries["tessera_criterion"] = metadata.criterion;
+    entries["tessera_layout"] = choiceName(metadata.layout, kLayouts);
+    entries["tessera_up_axis"] = choiceName(metadata.upAxis, kUpAxes);
+    entries["tessera_unit_scale"] = exactText(metadata.unitScale);
+    entries["tessera_spacing"] = exactText(metadata.tree.spacingWorld(0));
+    entries["tessera_precision"] = metadata.halfFloat ? "half" : "float";
+    entries["tessera_background"] = exactText(double(metadata.background));
+    entries["tessera_flat_level"] = std::to_string(metadata.flatLevel);
+    entries["tessera_fields"] = encodeFields(metadata.fields);
+    entries["tessera_report"] = reportToJson(metadata.report);
+    entries["tessera_bricks"] = encodeTree(metadata.tree);
+    return entries;
+}
+
+VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
+    if (entries.find("tessera_format") == entries.end()) throw InputError("not written by Tessera (it has no tessera_format)");
+    const double format = readDouble(entry(entries, "tessera_format"), "tessera_format");
+    if (format != kVdbFormat) throw InputError("it has Tessera's format " + exactText(format) + ", this version reads " + std::to_string(kVdbFormat));
+    VdbMetadata metadata;
+    metadata.version = entry(entries, "tessera_version");
+    metadata.sourceFile = entry(entries, "tessera_source");
+    metadata.algorithm = entry(entries, "tessera_algorithm");
+    metadata.criterion = entry(entries, "tessera_criterion");
+    metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
+    metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
+    metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");
+    metadata.halfFloat = entry(entries, "tessera_precision") == "half";
+    metadata.background = float(readDouble(entry(entries, "tessera_background"), "tessera_background"));
+    const double flatLevel = readDouble(entry(entries, "tessera_flat_level"), "tessera_flat_level");
+    if (!(flatLevel >= 0 && flatLevel < kMaxLevels)) damaged("tessera_flat_level is out of range");
+    metadata.flatLevel = int(flatLevel);
+    try {
+        metadata.fields = decodeFields(entry(entries, "tessera_fields"));
+        metadata.tree = decodeTree(entry(entries, "tessera_bricks"));
+    } catch (const Json::exception& error) {
+        damaged(error.what());
+    }
+    metadata.report = reportFromJson(entry(entries, "tessera_report"));
+    return metadata;
+}
+
+}  // namespace tessera

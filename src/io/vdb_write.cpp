@@ -1,0 +1,424 @@
+#include <openvdb/io/Archive.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <mutex>
+#include <ostream>
+
+#include "base/error.h"
+#include "io/atomic_file.h"
+#include "io/file_digest.h"
+#include "io/flat_tiles.h"
+#include "io/vdb_metadata.h"
+
+namespace tessera {
+namespace {
+
+using FloatLeaf = openvdb::FloatTree::LeafNodeType;
+using Vec3fLeaf = openvdb::Vec3STree::LeafNodeType;
+using BoolLeaf = openvdb::BoolTree::LeafNodeType;
+static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints, "tiles are laid out as OpenVDB's leaf nodes");
+
+constexpr std::size_t kUuidOffset = 21;   // after magic, format, library's two version numbers and a flag
+constexpr std::size_t kUuidBytes = 36;
+
+openvdb::Coord coord(const Vec3i& p) { return openvdb::Coord(p.x, p.y, p.z); }
+
+// A vector's components in the file's axes.
+openvdb::Vec3f turned(const openvdb::Vec3f& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return {v.x(), v.z(), -v.y()};
+    if (upAxis == UpAxis::z) return {v.x(), -v.z(), v.y()};
+    return v;
+}
+
+openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, double unitScale, UpAxis upAxis) {
+    namespace math = openvdb::math;
+    const Vec3d origin = tree.originWorld() * unitScale;
+    const double spacing = tree.spacingWorld(level) * unitScale;
+    if (upAxis == UpAxis::keep) {
+        const math::MapBase::Ptr map(new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
+        return math::Transform::Ptr(new math::Transform(map));
+    }
+    // Rows: where an index step along x, y, z leads in the file; the last row is the place of index (0, 0, 0).
+    const double s = spacing;
+    const math::Mat4d matrix = upAxis == UpAxis::y
+                                   ? math::Mat4d(s, 0, 0, 0, 0, 0, -s, 0, 0, s, 0, 0, origin.x, origin.z, -origin.y, 1)
+                                   : math::Mat4d(s, 0, 0, 0, 0, 0, s, 0, 0, -s, 0, 0, origin.x, -origin.z, origin.y, 1);
+    return math::Transform::Ptr(new math::Transform(math::MapBase::Ptr(new math::AffineMap(matrix))));
+}
+
+// Active bits of a tile where all given channels are finite, and the largest magnitude there.
+struct FiniteMask {
+    std::array<std::uint64_t, 8> words{};
+    float largest = 0;
+};
+
+FiniteMask finiteMask(const OutputTile& tile, int firstChannel, int components) {
+    FiniteMask mask;
+    mask.words = tile.active;
+    for (int c = firstChannel; c < firstChannel + components; ++c) {
+        const float* values = tile.channel(c);
+        for (std::size_t w = 0; w < 8; ++w) {
+            std::uint64_t finite = 0;
+            for (std::size_t b = 0; b < 64; ++b) finite |= std::uint64_t(std::isfinite(values[w * 64 + b])) << b;
+            mask.words[w] &= finite;
+        }
+    }
+    for (int c = firstChannel; c < firstChannel + components; ++c) {
+        const float* values = tile.channel(c);
+        for (std::size_t i = 0; i < kTilePoints; ++i) {
+            if (mask.words[i >> 6] >> (i & 63) & 1) mask.largest = std::max(mask.largest, std::abs(values[i]));
+        }
+    }
+    return mask;
+}
+
+template <class Leaf>
+void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
+    for (openvdb::Index w = 0; w < 8; ++w) leaf.getValueMask().template getWord<openvdb::Index64>(w) = words[w];
+}
+
+// The grid of one plan at one level, or the coverage mask.
+class GridBuilder {
+  public:
+    virtual ~GridBuilder() = default;
+    /// Makes the leaf nodes of a batch; may be called for several tiles at once.
+    virtual void makeLeaf(std::size_t position, const OutputTile& tile) = 0;
+    virtual void reserve(std::size_t tiles) = 0;
+    /// Puts the leaf nodes made since into the tree.
+    virtual void addLeaves() = 0;
+    virtual void extend(const ExtensionPoints&, const std::vector<std::pair<Vec3i, std::uint32_t>>&) {}
+    virtual openvdb::GridBase::Ptr grid() const = 0;
+    virtual float largest() const { return 0; }
+};
+
+template <class Grid>
+class BuilderOf : public GridBuilder {
+  public:
+    using Leaf = typename Grid::TreeType::LeafNodeType;
+    explicit BuilderOf(const typename Grid::ValueType& background) : grid_(Grid::create(background)) {}
+
+    void reserve(std::size_t tiles) override {
+        leaves_.resize(tiles);
+        largest_.assign(tiles, 0.0f);
+    }
+    void addLeaves() override {
+        typename Grid::Accessor accessor = grid_->getAccessor();
+        for (std::unique_ptr<Leaf>& leaf : leaves_) {
+            if (leaf) accessor.addLeaf(leaf.release());
+        }
+        for (float value : largest_) largestOfAll_ = std::max(largestOfAll_, value);
+    }
+    openvdb::GridBase::Ptr grid() const override { return grid_; }
+    float largest() const override { return largestOfAll_; }
+
+  protected:
+    typename Grid::Ptr grid_;
+    std::vector<std::unique_ptr<Leaf>> leaves_;
+    std::vector<float> largest_;
+    float largestOfAll_ = 0;
+};
+
+bool empty(const std::array<std::uint64_t, 8>& words) {
+    return std::all_of(words.begin(), words.end(), [](std::uint64_t word) { return word == 0; });
+}
+
+class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
+  public:
+    ScalarBuilder(int channel, float background) : BuilderOf(background), channel_(channel), background_(background) {}
+
+    void makeLeaf(std::size_t position, const OutputTile& tile) override {
+        const FiniteMask mask = finiteMask(tile, channel_, 1);
+        if (empty(mask.words)) return;
+        auto leaf = std::make_unique<FloatLeaf>(coord(tile.origin), background_);
+        float* values = leaf->buffer().data();
+        std::memcpy(values, tile.channel(channel_), kTilePoints * sizeof(float));
+        for (std::size_t i = 0; i < kTilePoints; ++i) {
+            if (!(mask.words[i >> 6] >> (i & 63) & 1)) values[i] = background_;
+        }
+        setMask(*leaf, mask.words);
+        leaves_[position] = std::move(leaf);
+        largest_[position] = mask.largest;
+    }
+    void extend(const ExtensionPoints& extension, const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
+        openvdb::FloatGrid::Accessor accessor = grid_->getAccessor();
+        for (const auto& [index, first] : points) {
+            const float value = extension.values[first + std::size_t(channel_)];
+            if (!std::isfinite(value) || accessor.isValueOn(coord(index))) continue;
+            accessor.setValueOn(coord(index), value);
+            largestOfAll_ = std::max(largestOfAll_, std::abs(value));
+        }
+    }
+
+  private:
+    int channel_;
+    float background_;
+};
+
+class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
+  public:
+    VectorBuilder(int channel, float background, UpAxis upAxis)
+        : BuilderOf(openvdb::Vec3f(background)), channel_(channel), background_(background), upAxis_(upAxis) {}
+
+    void makeLeaf(std::size_t position, const OutputTile& tile) override {
+        const FiniteMask mask = finiteMask(tile, channel_, 3);
+        if (empty(mask.words)) return;
+        auto leaf = std::make_unique<Vec3fLeaf>(coord(tile.origin), openvdb::Vec3f(background_));
+        openvdb::Vec3f* values = leaf->buffer().data();
+        const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1), *z = tile.channel(channel_ + 2);
+        for (std::size_t i = 0; i < kTilePoints; ++i) {
+            if (mask.words[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
+        }
+        setMask(*leaf, mask.words);
+        leaves_[position] = std::move(leaf);
+        largest_[position] = mask.largest;
+    }
+    void extend(const ExtensionPoints& extension, const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
+        openvdb::Vec3SGrid::Accessor accessor = grid_->getAccessor();
+        for (const auto& [index, first] : points) {
+            const float* v = extension.values.data() + first + channel_;
+            if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2])) continue;
+            if (accessor.isValueOn(coord(index))) continue;
+            accessor.setValueOn(coord(index), turned({v[0], v[1], v[2]}, upAxis_));
+            for (int c = 0; c < 3; ++c) largestOfAll_ = std::max(largestOfAll_, std::abs(v[c]));
+        }
+    }
+
+  private:
+    int channel_;
+    float background_;
+    UpAxis upAxis_;
+};
+
+class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
+  public:
+    CoverageBuilder() : BuilderOf(false) {}
+    void makeLeaf(std::size_t position, const OutputTile& tile) override {
+        if (empty(tile.coverage)) return;
+        auto leaf = std::make_unique<BoolLeaf>(coord(tile.origin), false);
+        setMask(*leaf, tile.coverage);
+        leaf->buffer() = BoolLeaf::Buffer(leaf->getValueMask());
+        leaves_[position] = std::move(leaf);
+    }
+};
+
+// All grids of one level.
+struct LevelGrids {
+    int level = 0;
+    std::vector<std::unique_ptr<GridBuilder>> builders;   // one a plan, then the coverage
+};
+
+LevelGrids makeBuilders(const std::vector<GridPlan>& plans, int level, const VdbWriteOptions& options) {
+    LevelGrids grids;
+    grids.level = level;
+    for (const GridPlan& plan : plans) {
+        if (plan.components == 3) {
+            grids.builders.push_back(std::make_unique<VectorBuilder>(plan.firstChannel, options.background, options.upAxis));
+        } else {
+            grids.builders.push_back(std::make_unique<ScalarBuilder>(plan.firstChannel, options.background));
+        }
+    }
+    grids.builders.push_back(std::make_unique<CoverageBuilder>());
+    return grids;
+}
+
+void addTiles(LevelGrids& grids, std::span<const OutputTile> tiles, const Execution& execution) {
+    for (auto& builder : grids.builders) builder->reserve(tiles.size());
+    parallelForChunks(execution, std::int64_t(tiles.size()), 64, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t i = begin; i < end; ++i) {
+            for (auto& builder : grids.builders) builder->makeLeaf(std::size_t(i), tiles[std::size_t(i)]);
+        }
+    });
+    parallelFor(execution, std::int64_t(grids.builders.size()),
+                [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
+}
+
+// Extension points that lie on the grid's lattice. In the flat layout a finer level's points count where they are points of the grid too.
+std::vector<std::pair<Vec3i, std::uint32_t>> pointsOnGrid(const ExtensionPoints& extension, VdbLayout layout, int level) {
+    std::vector<std::pair<Vec3i, std::uint32_t>> points;
+    for (const ExtensionPoint& point : extension.points) {
+        const int shift = level - point.level;
+        if (shift < 0 || (shift > 0 && layout == VdbLayout::levels)) continue;
+        const int mask = (1 << shift) - 1;
+        if ((point.index.x & mask) || (point.index.y & mask) || (point.index.z & mask)) continue;
+        points.emplace_back(Vec3i(point.index.x >> shift, point.index.y >> shift, point.index.z >> shift), point.firstValue);
+    }
+    return points;
+}
+
+std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResult& result, const ExtensionPoints* extension,
+                                   const Reconstruction* reconstruction, const VdbWriteOptions& options, int flatLevel,
+                                   const Execution& execution) {
+    const bool flat = options.layout == VdbLayout::flat;
+    std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
+    for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
+    std::vector<LevelGrids> all;
+    for (int level = 0; level < (flat ? 1 : result.tree.levelCount()); ++level) {
+        if (!flat && !present[std::size_t(level)]) continue;
+        const int gridLevel = flat ? flatLevel : level;
+        LevelGrids& grids = all.emplace_back(makeBuilders(plans, gridLevel, options));
+        const TileBatchSink sink = [&](std::span<const OutputTile> tiles) {
+            execution.throwIfCancelled();
+            addTiles(grids, tiles, execution);
+        };
+        if (flat) {
+            forEachFlatTile(result.tree, result.store, reconstruction, extension, gridLevel, execution, sink);
+        } else {
+            forEachLevelTile(result.tree, result.store, level, execution, sink);
+        }
+        if (!extension) continue;
+        const auto points = pointsOnGrid(*extension, options.layout, gridLevel);
+        parallelFor(execution, std::int64_t(grids.builders.size()),
+                    [&](std::int64_t b) { grids.builders[std::size_t(b)]->extend(*extension, points); });
+    }
+    return all;
+}
+
+// Half floats end at 65504 and lose digits below 6.1e-5.
+bool fitsHalf(float largest) { return largest == 0 || (largest <= 65504.0f && largest >= 6.2e-5f); }
+
+void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickTree& tree, int level, double unitScale, UpAxis upAxis) {
+    grid.setName(name);
+    grid.setTransform(makeTransform(tree, level, unitScale, upAxis));
+    grid.insertMeta("tessera_level", openvdb::Int32Metadata(level));
+    grid.insertMeta("tessera_spacing", openvdb::StringMetadata(exactText(tree.spacingWorld(level))));
+    grid.insertMeta("tessera_unit_scale", openvdb::StringMetadata(exactText(unitScale)));
+}
+
+// Grids in the order of the file: field by field, each with its finest level first, then the coverage.
+openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans, const BrickTree& tree,
+                                 const VdbWriteOptions& options, VdbWriteResult& result) {
+    openvdb::GridCPtrVec ordered;
+    for (std::size_t p = 0; p <= plans.size(); ++p) {
+        const bool coverage = p == plans.size();
+        float largest = 0;
+        for (const LevelGrids& grids : levels) largest = std::max(largest, grids.builders[p]->largest());
+        const bool half = !coverage && options.halfFloat && fitsHalf(largest);
+        if (!coverage && options.halfFloat && !half) {
+            result.notes.push_back("grid " + plans[p].name + " is written in full floats: its largest magnitude " +
+                                   exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
+        }
+        for (const LevelGrids& grids : levels) {
+            openvdb::GridBase& grid = *grids.builders[p]->grid();
+            const std::string base = coverage ? "coverage" : plans[p].name;
+            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, result.unitScale, options.upAxis);
+            grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
+            grid.setSaveFloatAsHalf(half);
+            if (!coverage) grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
+            if (!coverage && plans[p].components == 3) grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+            ordered.push_back(grids.builders[p]->grid());
+        }
+    }
+    return ordered;
+}
+
+// OpenVDB's own File hides failed writes, so grids go through a stream of ours.
+class StreamArchive : public openvdb::io::Archive {
+  public:
+    StreamArchive() {
+        setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+        setInstancingEnabled(false);
+    }
+    void writeTo(std::ostream& stream, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) const {
+        Archive::write(stream, grids, true, metadata);
+    }
+};
+
+// OpenVDB draws a random UUID for every file. Ours is the digest of all other bytes: equal content gives equal files, and a reader can tell
+// whether a file is damaged before it trusts it.
+void stampDigest(AtomicFile& file, const Execution& execution) {
+    std::array<char, kUuidBytes> blank;
+    blank.fill('0');
+    file.writeAt(kUuidOffset, blank.data(), blank.size());
+    FileDigest digest;
+    std::vector<char> bytes(std::size_t(1) << 20);
+    for (std::int64_t offset = 0; offset < file.size();) {
+        execution.throwIfCancelled();
+        const std::size_t got = file.readAt(offset, bytes.data(), bytes.size());
+        if (got == 0) throw IoError("can't read " + file.temporaryPath() + " back: it ends early");
+        digest.update(bytes.data(), got);
+        offset += std::int64_t(got);
+    }
+    const std::string uuid = digest.uuid();
+    file.writeAt(kUuidOffset, uuid.data(), uuid.size());
+}
+
+void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids, const std::map<std::string, std::string>& entries,
+               const Execution& execution) {
+    openvdb::MetaMap metadata;
+    for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
+    metadata.insertMeta("creator", openvdb::StringMetadata("Tessera " + entries.at("tessera_version")));
+    AtomicFileBuffer buffer(file, execution);
+    std::ostream stream(&buffer);
+    stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);
+    try {
+        StreamArchive().writeTo(stream, grids, metadata);
+        stream.flush();
+    } catch (const openvdb::Exception& error) {
+        throw IoError("can't write " + file.path() + ": " + error.what());
+    }
+    stampDigest(file, execution);
+}
+
+VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result, const VdbWriteOptions& options,
+                         const VdbWriteResult& written) {
+    VdbMetadata metadata;
+    metadata.tree = result.tree;
+    metadata.fields = fields;
+    metadata.report = result.report;
+    metadata.layout = options.layout;
+    metadata.version = TESSERA_VERSION;
+    metadata.sourceFile = options.sourceFile;
+    metadata.algorithm = options.algorithm;
+    metadata.criterion = options.criterion;
+    metadata.unitScale = written.unitScale;
+    metadata.upAxis = options.upAxis;
+    metadata.halfFloat = options.halfFloat;
+    metadata.background = options.background;
+    metadata.flatLevel = written.flatLevel;
+    return metadata;
+}
+
+void chooseFrame(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteResult& result) {
+    result.unitScale = chooseUnitScale(tree.spacingWorld(0), options.unitScale);
+    if (options.unitScale == 0 && result.unitScale != 1) {
+        result.notes.push_back("the finest voxel, " + exactText(tree.spacingWorld(0)) +
+                               " units, is smaller than OpenVDB takes: the file's unit is 1/" + exactText(result.unitScale) +
+                               " of the mesh's (see tessera_unit_scale in the file)");
+    }
+    if (options.layout == VdbLayout::levels) return;
+    const std::int64_t limit = options.maxFlatVoxels > 0 ? options.maxFlatVoxels : std::int64_t(1) << 31;
+    result.flatLevel = chooseFlatLevel(tree, limit);
+    if (result.flatLevel > 0) {
+        result.notes.push_back("the flat grid has spacing " + exactText(tree.spacingWorld(result.flatLevel)) + " instead of " +
+                               exactText(tree.spacingWorld(0)) + ": at the finest it would hold " +
+                               std::to_string(std::int64_t(flatPointCount(tree, 0))) + " voxels, the limit is " + std::to_string(limit));
+    }
+}
+
+}  // namespace
+
+VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
+                        const ExtensionPoints* extension, const Reconstruction* reconstruction, const VdbWriteOptions& options,
+                        const Execution& execution) {
+    checkOutputFields(fields);
+    VdbWriteResult written;
+    chooseFrame(result.tree, options, written);
+    AtomicFile file(path);
+    openvdb::initialize();
+    const std::vector<GridPlan> plans = planGrids(fields);
+    for (const GridPlan& plan : plans)
+        TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(), "a field's channels are in the store");
+    std::vector<LevelGrids> levels = buildGrids(plans, result, extension, reconstruction, options, written.flatLevel, execution);
+    const openvdb::GridCPtrVec grids = finishGrids(levels, plans, result.tree, options, written);
+    for (const openvdb::GridBase::ConstPtr& grid : grids) written.activeVoxels += std::int64_t(grid->activeVoxelCount());
+    writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written)), execution);
+    written.fileBytes = file.size();
+    file.commit();
+    return written;
+}
+
+}  // namespace tessera

@@ -1,0 +1,189 @@
+#include "mesh/nearest_point.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <vector>
+
+#include "mesh/box_tree.h"
+#include "mesh/geometry.h"
+
+namespace tessera {
+
+namespace {
+
+/// Box distances and triangle distances round differently; a subtree is left out only when it is further by more than this factor, so the
+/// result is the smallest computed distance over all faces whatever the order of the walk.
+constexpr double kPruneSlack = 1 + 1e-10;
+
+struct Candidate {
+    double distance2 = std::numeric_limits<double>::infinity();
+    std::array<double, 3> weights{};
+};
+
+/// A face with its nodes in ascending order: the distance to an edge comes out the same, bit for bit, from both its faces.
+struct Triangle {
+    std::array<Vec3d, 3> corners;
+    std::array<std::int32_t, 3> nodes;
+    std::int32_t element;
+};
+
+/// Nearest place on the edge i-j, which may have no length.
+void offerEdge(const Triangle& triangle, std::size_t i, std::size_t j, const Vec3d& point, Candidate& best) {
+    const Vec3d edge = triangle.corners[j] - triangle.corners[i];
+    const Vec3d toPoint = point - triangle.corners[i];
+    const double length2 = glm::dot(edge, edge);
+    const double along = glm::dot(toPoint, edge);
+    double t = 0;
+    if (along > 0) t = along < length2 ? along / length2 : 1;
+    const Vec3d offset = t == 1 ? point - triangle.corners[j] : toPoint - t * edge;
+    const double distance2 = glm::dot(offset, offset);
+    if (!(distance2 < best.distance2)) return;
+    best.distance2 = distance2;
+    best.weights = {};
+    best.weights[i] = 1 - t;
+    best.weights[j] = t;
+}
+
+/// Nearest place on a triangle that may be a segment or a point. Every candidate is a true place of the triangle with its own distance, so
+/// rounding can cost a little distance on a needle but never gives a wrong place.
+Candidate nearestOnTriangle(const Triangle& triangle, const Vec3d& point) {
+    const Vec3d u = triangle.corners[1] - triangle.corners[0];
+    const Vec3d v = triangle.corners[2] - triangle.corners[0];
+    const Vec3d w = point - triangle.corners[0];
+    const Vec3d normal = glm::cross(u, v);
+    const double normal2 = glm::dot(normal, normal);
+    Candidate best;
+    if (normal2 > 0) {
+        const double t1 = glm::dot(glm::cross(w, v), normal) / normal2;
+        const double t2 = glm::dot(glm::cross(u, w), normal) / normal2;
+        const double t0 = 1 - t1 - t2;
+        if (t0 > 0 && t1 > 0 && t2 > 0) {
+            const Vec3d offset = w - (t1 * u + t2 * v);
+            best = {glm::dot(offset, offset), {t0, t1, t2}};
+            // Away from the rim, and when the triangle is no needle, no edge can be nearer.
+            const double longest2 = std::max(glm::dot(u, u), glm::dot(v, v));
+            if (std::min({t0, t1, t2}) > 1e-6 && normal2 > 1e-8 * longest2 * longest2) return best;
+        }
+    }
+    offerEdge(triangle, 0, 1, point, best);
+    offerEdge(triangle, 0, 2, point, best);
+    offerEdge(triangle, 1, 2, point, best);
+    return best;
+}
+
+struct PendingNode {
+    double distance2;
+    int level;
+    std::int64_t index;
+};
+
+}  // namespace
+
+double NearestPoint::value(const Field& field, int component) const {
+    if (element < 0) return std::numeric_limits<double>::quiet_NaN();
+    if (field.location == FieldLocation::cell) {
+        const double v = field.at(element, component);
+        return std::isfinite(v) ? v : std::numeric_limits<double>::quiet_NaN();
+    }
+    double sum = 0;
+    ValueRange range;
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (!(weights[i] > 0)) continue;
+        const double v = field.at(nodes[i], component);
+        if (!std::isfinite(v)) return std::numeric_limits<double>::quiet_NaN();
+        sum += weights[i] * v;
+        range.min = std::min(range.min, v);
+        range.max = std::max(range.max, v);
+    }
+    return std::clamp(sum, range.min, range.max);
+}
+
+struct NearestPointIndex::Impl {
+    BoxTree tree;
+    std::vector<Triangle> triangles;   // in the order of the tree
+
+    void offerTriangle(std::int64_t place, const Vec3d& point, double& best2, const Triangle*& bestTriangle,
+                       Candidate& best) const {
+        const Triangle& triangle = triangles[std::size_t(place)];
+        const Candidate candidate = nearestOnTriangle(triangle, point);
+        if (candidate.distance2 > best2) return;
+        if (candidate.distance2 == best2 && bestTriangle &&
+            std::tie(bestTriangle->element, bestTriangle->nodes) <= std::tie(triangle.element, triangle.nodes))
+            return;
+        best2 = candidate.distance2;
+        bestTriangle = &triangle;
+        best = candidate;
+    }
+};
+
+NearestPointIndex::NearestPointIndex(const TetMesh& mesh, int threads) : impl_(std::make_unique<Impl>()) {
+    Execution execution;
+    execution.threads = threads;
+    const std::vector<BoundaryFace> faces = boundaryFaces(mesh, threads);
+    std::vector<Box3d> boxes(faces.size());
+    for (std::size_t f = 0; f < faces.size(); ++f)
+        for (const std::int32_t node : faces[f].nodes) boxes[f].include(mesh.points[std::size_t(node)]);
+    impl_->tree = BoxTree(boxes, execution);
+    impl_->triangles.reserve(faces.size());
+    for (const std::int32_t f : impl_->tree.order()) {
+        Triangle triangle;
+        triangle.nodes = faces[std::size_t(f)].nodes;
+        std::sort(triangle.nodes.begin(), triangle.nodes.end());
+        for (std::size_t i = 0; i < 3; ++i) triangle.corners[i] = mesh.points[std::size_t(triangle.nodes[i])];
+        triangle.element = faces[std::size_t(f)].element;
+        impl_->triangles.push_back(triangle);
+    }
+}
+
+NearestPointIndex::~NearestPointIndex() = default;
+
+NearestPoint NearestPointIndex::find(const Vec3d& pointWorld, double maxDistanceWorld) const {
+    NearestPoint result;
+    const BoxTree& tree = impl_->tree;
+    if (tree.empty() || !(maxDistanceWorld >= 0)) return result;
+
+    double best2 = maxDistanceWorld * maxDistanceWorld;
+    const Triangle* bestTriangle = nullptr;
+    Candidate best;
+    // Four children a level, at most 16 levels over 2^31 faces.
+    std::array<PendingNode, 64> stack;
+    std::size_t pending = 0;
+    stack[pending++] = {0, tree.levelCount() - 1, 0};
+    while (pending > 0) {
+        const PendingNode current = stack[--pending];
+        if (current.distance2 > best2 * kPruneSlack) continue;
+        const BoxTree::Node& node = tree.node(current.level, current.index);
+        std::array<double, BoxTree::kWidth> distance2{};
+        for (std::size_t k = 0; k < 3; ++k)
+            for (std::size_t c = 0; c < BoxTree::kWidth; ++c) {
+                const double p = pointWorld[int(k)];
+                const double d = std::max(std::max(node.min[k][c] - p, p - node.max[k][c]), 0.0);
+                distance2[c] += d * d;
+            }
+        std::array<std::size_t, BoxTree::kWidth> order{0, 1, 2, 3};
+        for (std::size_t i = 1; i < order.size(); ++i)
+            for (std::size_t j = i; j > 0 && distance2[order[j]] < distance2[order[j - 1]]; --j)
+                std::swap(order[j], order[j - 1]);
+        if (current.level == 0) {
+            for (const std::size_t c : order)
+                if (distance2[c] <= best2 * kPruneSlack && distance2[c] < std::numeric_limits<double>::infinity())
+                    impl_->offerTriangle(current.index * BoxTree::kWidth + std::int64_t(c), pointWorld, best2,
+                                         bestTriangle, best);
+            continue;
+        }
+        for (std::size_t i = order.size(); i-- > 0;)
+            if (distance2[order[i]] <= best2 * kPruneSlack && distance2[order[i]] < std::numeric_limits<double>::infinity())
+                stack[pending++] = {distance2[order[i]], current.level - 1,
+                                    current.index * BoxTree::kWidth + std::int64_t(order[i])};
+    }
+    if (!bestTriangle) return result;
+    result.element = bestTriangle->element;
+    result.nodes = bestTriangle->nodes;
+    result.weights = best.weights;
+    result.distanceWorld = std::sqrt(best2);
+    return result;
+}
+
+}  // namespace tessera

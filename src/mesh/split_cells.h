@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "base/execution.h"
+#include "base/vec.h"
+
+namespace tessera {
+
+/// Linear 3D cells. Nodes are in the order of VTK's cell of the same name (a voxel's in that of vtkVoxel).
+enum class CellKind : std::uint8_t { tet, pyramid, wedge, hex, voxel, polyhedron };
+
+/// Number of nodes of a kind, 0 for a polyhedron.
+int nodeCountOf(CellKind kind);
+
+/// Cells of mixed kinds over common points.
+struct CellList {
+    std::vector<CellKind> kinds;          ///< one a cell
+    std::vector<std::int64_t> begin{0};   ///< cell c is nodes[begin[c]] to nodes[begin[c + 1] - 1]
+    /// Node indices. A polyhedron is its face stream: number of faces, then for each face its number of nodes and these, counter-clockwise
+    /// seen from outside.
+    std::vector<std::int32_t> nodes;
+
+    std::int64_t cellCount() const { return std::int64_t(kinds.size()); }
+    void add(CellKind kind, const std::int32_t* first, std::int64_t count) {
+        kinds.push_back(kind);
+        nodes.insert(nodes.end(), first, first + count);
+        begin.push_back(std::int64_t(nodes.size()));
+    }
+};
+
+/// A node that splitting added: the mean of other nodes, and so are its field values.
+struct AddedNode {
+    Vec3d point;
+    std::vector<std::int32_t> parents;
+};
+
+struct SplitCells {
+    std::vector<std::array<std::int32_t, 4>> tets;
+    std::vector<std::int32_t> sourceCell;   ///< cell of every tet, ascending
+    std::vector<AddedNode> addedNodes;      ///< node points.size() + i is addedNodes[i]
+};
+
+/// Splits cells into tetrahedra so that both sides of a shared face are cut alike: a face is fanned from its node that is smallest in
+/// lexicographic order of its coordinates (ties: of its index), which holds across blocks with separate points too. A cell is the cone from its own smallest
+/// node over the triangles of its other faces. A polyhedron takes another node, or its centre, when that inverts
+/// a tet. Tets keep the orientation of their cell. Tets with a repeated node are left out; other flat ones are kept.
+/// @param cells every node index lies in [0, points.size()); every polyhedron's face stream is whole.
+SplitCells splitCells(const std::vector<Vec3d>& points, const CellList& cells, const Execution& execution);
+
+}  // namespace tessera

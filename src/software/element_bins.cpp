@@ -1,0 +1,163 @@
+#include "software/element_bins.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera {
+
+namespace {
+
+struct Pair {
+    std::int32_t region;
+    std::int32_t element;
+};
+
+// A coarse grid over all regions; each cell lists the regions that reach into it.
+class RegionGrid {
+  public:
+    explicit RegionGrid(std::span<const IndexBox> regions) : regions_(regions) {
+        bounds_ = regions[0];
+        Vec3i smallest = regions[0].size();
+        for (const IndexBox& region : regions) {
+            bounds_.min = glm::min(bounds_.min, region.min);
+            bounds_.max = glm::max(bounds_.max, region.max);
+            smallest = glm::min(smallest, region.size());
+        }
+        std::size_t cells = 1;
+        for (int a = 0; a < 3; ++a) {
+            const int extent = bounds_.max[a] - bounds_.min[a];
+            edge_[a] = std::max(smallest[a], (extent + kMostCells - 1) / kMostCells);
+            cells_[a] = (extent + edge_[a] - 1) / edge_[a];
+            cells *= std::size_t(cells_[a]);
+        }
+        first_.assign(cells + 1, 0);
+        forEachCellOfRegions([&](std::size_t cell, std::int32_t) { ++first_[cell + 1]; });
+        for (std::size_t c = 0; c < cells; ++c) first_[c + 1] += first_[c];
+        list_.resize(std::size_t(first_[cells]));
+        std::vector<std::int32_t> next(first_.begin(), first_.end() - 1);
+        forEachCellOfRegions(
+            [&](std::size_t cell, std::int32_t region) { list_[std::size_t(next[cell]++)] = region; });
+    }
+
+    const IndexBox& bounds() const { return bounds_; }
+
+    // Calls found(region) once for every region that shares a lattice point with the closed box low..high inside bounds().
+    template <class Found>
+    void forEachRegion(const Vec3i& low, const Vec3i& high, const Found& found) const {
+        const Vec3i a = cellOf(low), b = cellOf(high);
+        for (int z = a.z; z <= b.z; ++z)
+            for (int y = a.y; y <= b.y; ++y)
+                for (int x = a.x; x <= b.x; ++x) {
+                    const std::size_t cell = index({x, y, z});
+                    for (std::int32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+                        const std::int32_t region = list_[std::size_t(i)];
+                        const IndexBox& box = regions_[std::size_t(region)];
+                        const Vec3i corner = glm::max(low, box.min);
+                        if (high.x < box.min.x || high.y < box.min.y || high.z < box.min.z || low.x >= box.max.x ||
+                            low.y >= box.max.y || low.z >= box.max.z)
+                            continue;
+                        // A region that shares several cells with the box counts in the first only.
+                        if (cellOf(corner) == Vec3i{x, y, z}) found(region);
+                    }
+                }
+    }
+
+  private:
+    static constexpr int kMostCells = 128;
+
+    Vec3i cellOf(const Vec3i& p) const {
+        return {(p.x - bounds_.min.x) / edge_.x, (p.y - bounds_.min.y) / edge_.y, (p.z - bounds_.min.z) / edge_.z};
+    }
+    std::size_t index(const Vec3i& cell) const {
+        return (std::size_t(cell.z) * std::size_t(cells_.y) + std::size_t(cell.y)) * std::size_t(cells_.x) +
+               std::size_t(cell.x);
+    }
+    template <class Visit>
+    void forEachCellOfRegions(const Visit& visit) const {
+        for (std::size_t r = 0; r < regions_.size(); ++r) {
+            const Vec3i a = cellOf(regions_[r].min), b = cellOf(regions_[r].max - 1);
+            for (int z = a.z; z <= b.z; ++z)
+                for (int y = a.y; y <= b.y; ++y)
+                    for (int x = a.x; x <= b.x; ++x) visit(index({x, y, z}), std::int32_t(r));
+        }
+    }
+
+    std::span<const IndexBox> regions_;
+    IndexBox bounds_;
+    Vec3i edge_{1}, cells_{1};
+    std::vector<std::int32_t> first_, list_;
+};
+
+// Bounds of an element in lattice points from the rounded node places, widened by their rounding. False when they hold none in `bounds`.
+bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, const IndexBox& bounds, Vec3i& low,
+                   Vec3i& high) {
+    const float* n0 = frame.rough[std::size_t(tet[0])].data();
+    const float* n1 = frame.rough[std::size_t(tet[1])].data();
+    const float* n2 = frame.rough[std::size_t(tet[2])].data();
+    const float* n3 = frame.rough[std::size_t(tet[3])].data();
+    float least[4], most[4];
+    for (int a = 0; a < 4; ++a) {
+        const float minimum = std::min(std::min(n0[a], n1[a]), std::min(n2[a], n3[a]));
+        const float maximum = std::max(std::max(n0[a], n1[a]), std::max(n2[a], n3[a]));
+        least[a] = minimum - (std::fabs(minimum) * 0x1p-22f + 0x1p-26f);
+        most[a] = maximum + (std::fabs(maximum) * 0x1p-22f + 0x1p-26f);
+    }
+    for (int a = 0; a < 3; ++a) {
+        const float from = std::max(least[a], float(bounds.min[a]) - 1.0f - std::fabs(float(bounds.min[a])) * 0x1p-22f);
+        const float to = std::min(most[a], float(bounds.max[a]) + 1.0f + std::fabs(float(bounds.max[a])) * 0x1p-22f);
+        if (!(from <= to)) return false;
+        low[a] = std::max(int(std::ceil(from)), bounds.min[a]);
+        high[a] = std::min(int(std::floor(to)), bounds.max[a] - 1);
+        if (low[a] > high[a]) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
+                        const Execution& execution) {
+    ElementBins bins;
+    bins.first.assign(regions.size() + 1, 0);
+    if (regions.empty()) return bins;
+    const RegionGrid grid(regions);
+    const std::int64_t elements = mesh.elementCount();
+    const std::int64_t chunk = std::max<std::int64_t>(4096, elements / (8 * execution.threadCount()) + 1);
+    const std::size_t chunks = std::size_t((elements + chunk - 1) / chunk);
+    std::vector<std::vector<Pair>> pairs(chunks);
+    std::vector<std::vector<std::int32_t>> counts(chunks);
+    parallelForChunks(execution, elements, chunk, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<Pair>& found = pairs[std::size_t(begin / chunk)];
+        std::vector<std::int32_t>& count = counts[std::size_t(begin / chunk)];
+        count.assign(regions.size(), 0);
+        found.reserve(std::size_t(end - begin));
+        for (std::int64_t e = begin; e < end; ++e) {
+            Vec3i low, high;
+            if (!latticeBounds(frame, mesh.tets[std::size_t(e)], grid.bounds(), low, high)) continue;
+            grid.forEachRegion(low, high, [&](std::int32_t region) {
+                found.push_back({region, std::int32_t(e)});
+                ++count[std::size_t(region)];
+            });
+        }
+    });
+    for (std::size_t r = 0; r < regions.size(); ++r) {
+        std::int64_t next = bins.first[r];
+        for (std::size_t c = 0; c < chunks; ++c) {
+            const std::int32_t count = counts[c][r];
+            counts[c][r] = std::int32_t(next - bins.first[r]);
+            next += count;
+        }
+        bins.first[r + 1] = next;
+    }
+    bins.elements.resize(std::size_t(bins.first.back()));
+    parallelFor(execution, std::int64_t(chunks), [&](std::int64_t c) {
+        std::vector<std::int32_t>& place = counts[std::size_t(c)];
+        for (const Pair& pair : pairs[std::size_t(c)]) {
+            const std::size_t r = std::size_t(pair.region);
+            bins.elements[std::size_t(bins.first[r] + place[r]++)] = pair.element;
+        }
+    });
+    return bins;
+}
+
+}  // namespace tessera

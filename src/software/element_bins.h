@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/execution.h"
+#include "mesh/tet_mesh.h"
+#include "software/node_frame.h"
+
+namespace tessera {
+
+/// For every region the elements whose bounding boxes hold one of its lattice points, ascending.
+struct ElementBins {
+    std::vector<std::int64_t> first;        ///< regions + 1 offsets into `elements`
+    std::vector<std::int32_t> elements;
+
+    std::span<const std::int32_t> of(std::size_t region) const {
+        return {elements.data() + first[region], std::size_t(first[region + 1] - first[region])};
+    }
+};
+
+/// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice point in their
+/// (slightly widened) bounding box appear nowhere.
+ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
+                        const Execution& execution);
+
+}  // namespace tessera

@@ -1,0 +1,286 @@
+// Elements too thin for double precision: the same walk in 113-bit arithmetic and, where even that is too coarse, in rationals.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "mesh/geometry.h"
+#include "software/scan.h"
+
+namespace tessera {
+
+namespace {
+
+double toDouble(Quad x) { return double(x); }
+double toDouble(const mpq_class& x) { return x.get_d(); }
+
+double floorToDouble(Quad x) {
+    const double rounded = double(x);
+    if (std::fabs(rounded) >= 0x1p52) return rounded;
+    const double whole = std::floor(rounded);
+    return Quad(whole) > x ? whole - 1 : whole;
+}
+double floorToDouble(const mpq_class& x) {
+    mpz_class whole;
+    mpz_fdiv_q(whole.get_mpz_t(), x.get_num_mpz_t(), x.get_den_mpz_t());
+    return whole.get_d();
+}
+template <class Real>
+double ceilToDouble(const Real& x) {
+    return -floorToDouble(Real(-x));
+}
+template <class Real>
+Real absolute(const Real& x) {
+    return x < 0 ? Real(-x) : x;
+}
+
+// An element in index coordinates relative to its first voxel, and its barycentrics constant + gradient . (x, y, z).
+template <class Real>
+struct ExactElement {
+    double base[3];
+    Real node[4][3];
+    Real low[3], high[3];
+    Real gradient[4][3];
+    Real constant[4];
+    Real dilation;   // bound on the rounding of a barycentric coordinate
+};
+
+template <class Real>
+bool setUpGradients(ExactElement<Real>& e) {
+    Real edge[3][3], normal[3][3];
+    for (int k = 0; k < 3; ++k)
+        for (int a = 0; a < 3; ++a) edge[k][a] = e.node[k + 1][a] - e.node[0][a];
+    for (int k = 0; k < 3; ++k) {
+        const auto& p = edge[(k + 1) % 3];
+        const auto& q = edge[(k + 2) % 3];
+        for (int a = 0; a < 3; ++a)
+            normal[k][a] = p[(a + 1) % 3] * q[(a + 2) % 3] - p[(a + 2) % 3] * q[(a + 1) % 3];
+    }
+    const Real det = edge[0][0] * normal[0][0] + edge[0][1] * normal[0][1] + edge[0][2] * normal[0][2];
+    if (det == 0) return false;
+    e.constant[0] = 1;
+    for (int a = 0; a < 3; ++a) e.gradient[0][a] = 0;
+    for (int k = 1; k < 4; ++k) {
+        e.constant[k] = 0;
+        for (int a = 0; a < 3; ++a) {
+            e.gradient[k][a] = normal[k - 1][a] / det;
+            e.constant[k] -= e.gradient[k][a] * e.node[0][a];
+            e.gradient[0][a] -= e.gradient[k][a];
+        }
+        e.constant[0] -= e.constant[k];
+    }
+    return true;
+}
+
+template <class Real>
+void setUpBox(ExactElement<Real>& e) {
+    for (int a = 0; a < 3; ++a) {
+        e.low[a] = e.high[a] = e.node[0][a];
+        for (int k = 1; k < 4; ++k) {
+            if (e.node[k][a] < e.low[a]) e.low[a] = e.node[k][a];
+            if (e.node[k][a] > e.high[a]) e.high[a] = e.node[k][a];
+        }
+    }
+}
+
+// False when 113 bits can't promise the limits of scan.h.
+bool setUp(const ScanInput& input, std::int32_t element, const double (&base)[3], ExactElement<Quad>& e) {
+    const auto& tet = input.mesh.tets[std::size_t(element)];
+    double farthest = 1;
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto index = quadIndexFromWorld(input.frame.lattice, input.mesh.points[std::size_t(tet[k])]);
+        for (std::size_t a = 0; a < 3; ++a) {
+            farthest = std::max(farthest, std::fabs(double(index[a])));
+            e.node[k][a] = index[a] - Quad(base[a]);
+        }
+    }
+    setUpBox(e);
+    if (!setUpGradients(e)) return false;
+    const Quad unit = 0x1p-112;
+    Quad steepest = 0, boxVolume = 1, size = 0, longest = 0;
+    for (int k = 0; k < 4; ++k)
+        steepest = std::max(steepest, absolute(e.gradient[k][0]) + absolute(e.gradient[k][1]) + absolute(e.gradient[k][2]));
+    for (int a = 0; a < 3; ++a) {
+        const Quad extent = e.high[a] - e.low[a];
+        boxVolume *= extent;
+        size += extent;
+        longest = std::max(longest, extent);
+    }
+    // |det| from the gradient: gradient 1 = normal / det, so the box volume over it bounds the relative error of det.
+    Quad det = 0;
+    {
+        Quad edge[3][3];
+        for (int k = 0; k < 3; ++k)
+            for (int a = 0; a < 3; ++a) edge[k][a] = e.node[k + 1][a] - e.node[0][a];
+        for (int a = 0; a < 3; ++a)
+            det += edge[0][a] * (edge[1][(a + 1) % 3] * edge[2][(a + 2) % 3] - edge[1][(a + 2) % 3] * edge[2][(a + 1) % 3]);
+    }
+    e.dilation = unit * (256 * boxVolume / absolute(det) + 128 * steepest * (longest + Quad(farthest) + 2));
+    return e.dilation <= Quad(kLargestSlack) && e.dilation * size <= Quad(kLargestSlackTimesSize);
+}
+
+void setUp(const ScanInput& input, std::int32_t element, const double (&base)[3], ExactElement<mpq_class>& e) {
+    const auto& tet = input.mesh.tets[std::size_t(element)];
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto index = exactIndexFromWorld(input.frame.lattice, input.mesh.points[std::size_t(tet[k])]);
+        for (std::size_t a = 0; a < 3; ++a) e.node[k][a] = index[a] - mpq_class(base[a]);
+    }
+    setUpBox(e);
+    setUpGradients(e);   // the caller made sure that the exact volume isn't zero
+    e.dilation = 0;
+}
+
+// A channel's linear function; `finite` false: every point is covered but not valid.
+template <class Real>
+struct ExactChannel {
+    bool finite;
+    float low, high;
+    Real f0, difference[3];
+
+    ExactChannel(const ScanChannel& source, const std::array<std::int32_t, 4>& tet, std::int32_t element) : finite(true) {
+        low = std::numeric_limits<float>::infinity();
+        high = -low;
+        double values[4];
+        for (std::size_t k = 0; k < 4; ++k) {
+            values[k] = source.at(source.cell ? element : tet[k]);
+            const float rounded = float(values[k]);
+            finite = finite && std::isfinite(rounded);
+            low = std::min(low, rounded);
+            high = std::max(high, rounded);
+        }
+        if (!finite) return;
+        f0 = values[0];
+        for (int k = 0; k < 3; ++k) difference[k] = Real(values[k + 1]) - Real(values[0]);
+    }
+
+    float at(const Real (&barycentric)[4]) const {
+        if (!finite) return std::numeric_limits<float>::quiet_NaN();
+        const double value = toDouble(Real(f0 + difference[0] * barycentric[1] + difference[1] * barycentric[2] +
+                                           difference[2] * barycentric[3]));
+        return std::clamp(float(std::clamp(value, double(low), double(high))), low, high);
+    }
+};
+
+// Ends of the scanline at (t, r) along axis `s`, relative to the first voxel.
+template <class Real>
+bool scanlineEnds(const ExactElement<Real>& e, int s, int t, int r, double atT, double atR, double& begin, double& end) {
+    Real low = e.low[s] - Real(e.dilation == 0 ? 0.0 : kBoxSlack), high = e.high[s] + Real(e.dilation == 0 ? 0.0 : kBoxSlack);
+    for (int k = 0; k < 4; ++k) {
+        const Real rest = e.dilation + e.constant[k] + e.gradient[k][t] * Real(atT) + e.gradient[k][r] * Real(atR);
+        const Real& slope = e.gradient[k][s];
+        if (slope == 0) {
+            if (rest < 0) return false;
+            continue;
+        }
+        const Real bound = -rest / slope;
+        if (slope > 0) {
+            if (bound > low) low = bound;
+        } else {
+            if (bound < high) high = bound;
+        }
+    }
+    begin = ceilToDouble(low);
+    end = floorToDouble(high);
+    return begin <= end;
+}
+
+template <class Real>
+void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ExactElement<Real>& e, ScanCounts& counts) {
+    // The longest axis is scanned: here a scanline's ends cost far more than its voxels.
+    int s = 0;
+    for (int a = 1; a < 3; ++a)
+        if (Real(e.high[a] - e.low[a]) > Real(e.high[s] - e.low[s])) s = a;
+    const int t = s == 0 ? 1 : 0, r = s == 2 ? 1 : 2;
+    const double slack = e.dilation == 0 ? 0.0 : kBoxSlack;
+    double from[3], to[3];
+    for (int a = 0; a < 3; ++a) {
+        from[a] = std::max(output.region.min[a] - e.base[a], ceilToDouble(Real(e.low[a] - Real(slack))));
+        to[a] = std::min(output.region.max[a] - 1 - e.base[a], floorToDouble(Real(e.high[a] + Real(slack))));
+        if (from[a] > to[a]) return;
+    }
+    const auto& tet = input.mesh.tets[std::size_t(element)];
+    std::vector<ExactChannel<Real>> channels;
+    for (const ScanChannel& source : input.channels) channels.emplace_back(source, tet, element);
+    std::optional<ElementDepth> depth;
+
+    for (double atR = from[r]; atR <= to[r]; ++atR) {
+        for (double atT = from[t]; atT <= to[t]; ++atT) {
+            ++counts.scanlines;
+            double begin = 0, end = 0;
+            if (!scanlineEnds(e, s, t, r, atT, atR, begin, end)) continue;
+            for (double atS = std::max(begin, from[s]); atS <= std::min(end, to[s]); ++atS) {
+                Vec3i point;
+                point[s] = int(std::int64_t(e.base[s]) + std::int64_t(atS));
+                point[t] = int(std::int64_t(e.base[t]) + std::int64_t(atT));
+                point[r] = int(std::int64_t(e.base[r]) + std::int64_t(atR));
+                const std::int64_t offset = output.offset(point);
+                if (output.owner[offset] == kNoOwner) {
+                    output.owner[offset] = element;
+                } else {
+                    ++counts.contested;
+                    if (!depth) depth.emplace(input.mesh, input.frame, element);
+                    if (!contestPoint(input, output, element, *depth, point)) continue;
+                }
+                Real barycentric[4];
+                for (int k = 0; k < 4; ++k)
+                    barycentric[k] = e.constant[k] + e.gradient[k][s] * Real(atS) + e.gradient[k][t] * Real(atT) +
+                                     e.gradient[k][r] * Real(atR);
+                for (std::size_t c = 0; c < channels.size(); ++c) output.values[c][offset] = channels[c].at(barycentric);
+            }
+        }
+    }
+}
+
+bool hasRepeatedNode(const TetMesh& mesh, const std::array<std::int32_t, 4>& tet) {
+    for (std::size_t i = 0; i < 4; ++i)
+        for (std::size_t j = i + 1; j < 4; ++j)
+            if (tet[i] == tet[j] || mesh.points[std::size_t(tet[i])] == mesh.points[std::size_t(tet[j])]) return true;
+    return false;
+}
+
+}  // namespace
+
+void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts) {
+    const TetMesh& mesh = input.mesh;
+    const auto& tet = mesh.tets[std::size_t(element)];
+    if (hasRepeatedNode(mesh, tet)) return;
+    const auto corner = [&](std::size_t k) { return mesh.points[std::size_t(tet[k])]; };
+    if (volumeSign(corner(0), corner(1), corner(2), corner(3)) == 0) return;
+    ++counts.exactElements;
+    double base[3];
+    for (int a = 0; a < 3; ++a) {
+        base[a] = input.frame.nodes[std::size_t(tet[0])].whole[a];
+        for (std::size_t k = 1; k < 4; ++k) base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
+    }
+    ExactElement<Quad> quad;
+    std::copy_n(base, 3, quad.base);
+    if (setUp(input, element, base, quad)) {
+        walk(input, output, element, quad, counts);
+        return;
+    }
+    ExactElement<mpq_class> exact;
+    std::copy_n(base, 3, exact.base);
+    setUp(input, element, base, exact);
+    walk(input, output, element, exact, counts);
+}
+
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ElementDepth& depth,
+                  const Vec3i& point) {
+    const std::int64_t offset = output.offset(point);
+    std::int32_t& owner = output.owner[offset];
+    const std::int32_t present = owner & kElementMask;
+    if (!(owner & kDepthKnown)) {
+        output.depth[offset] = ElementDepth(input.mesh, input.frame, present).at(point);
+        owner |= kDepthKnown;
+    }
+    const double deep = depth.at(point);
+    if (deep < output.depth[offset] || (deep == output.depth[offset] && element > present)) return false;
+    owner = element | kDepthKnown;
+    output.depth[offset] = deep;
+    return true;
+}
+
+}  // namespace tessera

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <gmpxx.h>
+
+#include <array>
+#include <vector>
+
+#include "base/execution.h"
+#include "lattice/lattice.h"
+#include "mesh/tet_mesh.h"
+
+namespace tessera {
+
+/// 113 bits: what an element too thin for double is computed in.
+__extension__ typedef __float128 Quad;
+
+/// The nodes of a mesh in the index space of a lattice.
+///
+/// Coordinates are kept as whole + part, part in about [0, 1): positions relative to an element's own first voxel then come out with
+/// an error of a few 2^-53 of the element's size in voxels, however far from the origin the element lies.
+struct NodeFrame {
+    struct Node {
+        double whole[3];
+        double part[3];   ///< absolute error at most 4 * 2^-53
+    };
+    Lattice lattice;
+    std::vector<Node> nodes;
+    std::vector<std::array<float, 4>> rough;   ///< rounded index coordinates, for culling only
+};
+
+NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution);
+
+/// Index coordinates of a place, relative error about 2^-112 of the largest.
+std::array<Quad, 3> quadIndexFromWorld(const Lattice& lattice, const Vec3d& pointWorld);
+
+/// Exact index coordinates of a place.
+std::array<mpq_class, 3> exactIndexFromWorld(const Lattice& lattice, const Vec3d& pointWorld);
+
+}  // namespace tessera

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/vec.h"
+#include "mesh/tet_mesh.h"
+#include "software/element_depth.h"
+#include "software/node_frame.h"
+
+namespace tessera {
+
+/// One component of one field.
+struct ScanChannel {
+    const double* values;   ///< interleaved
+    int components;
+    int component;
+    bool cell;
+
+    double at(std::int32_t item) const { return values[std::int64_t(item) * components + component]; }
+};
+
+/// What is sampled.
+struct ScanInput {
+    const TetMesh& mesh;
+    const NodeFrame& frame;
+    std::span<const ScanChannel> channels;
+};
+
+/// Bit of `owner` that says that `depth` holds the owner's depth.
+inline constexpr std::int32_t kDepthKnown = 1 << 30;
+inline constexpr std::int32_t kElementMask = kDepthKnown - 1;
+inline constexpr std::int32_t kNoOwner = -1;
+
+/// Where the samples go: arrays over `blockBox`, of which a scan fills only `region`.
+struct ScanOutput {
+    IndexBox region;
+    IndexBox blockBox;
+    std::int64_t stride[3];            ///< of x, y and z
+    std::span<float* const> values;    ///< one array a channel
+    std::int32_t* owner;               ///< kNoOwner, or the covering element, perhaps with kDepthKnown
+    double* depth;                     ///< written when a point becomes contested
+
+    std::int64_t offset(const Vec3i& p) const {
+        const Vec3i q = p - blockBox.min;
+        return q.x * stride[0] + q.y * stride[1] + q.z * stride[2];
+    }
+};
+
+struct ScanCounts {
+    std::int64_t scanlines = 0;
+    std::int64_t contested = 0;
+    std::int64_t exactElements = 0;
+};
+
+/// True when `element`, which covers the point, owns it rather than the present owner. Updates owner and depth, not the values.
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ElementDepth& depth,
+                  const Vec3i& point);
+
+/// Samples one element in 113-bit arithmetic or, where that isn't enough, in rationals.
+void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts);
+
+using ScanFunction = void (*)(const ScanInput&, const ScanOutput&, std::span<const std::int32_t> elements, ScanCounts&);
+
+/// A compiled version of the scan for one instruction set.
+struct ScanTarget {
+    std::string name;
+    ScanFunction scan;
+};
+/// Those that this processor can run, the fastest first. All give the same bits.
+const std::vector<ScanTarget>& scanTargets();
+
+/// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding: these limits on T keep a covered point
+/// within 2^-26 voxel of the element and its value within 1/16 ulp (derivation in docs/algorithms.md).
+inline constexpr double kLargestSlack = 0x1p-28;
+inline constexpr double kLargestSlackTimesSize = 0x1p-29;
+/// Widening of an element's bounding box, in voxels; above the rounding of node places.
+inline constexpr double kBoxSlack = 0x1p-30;
+
+}  // namespace tessera

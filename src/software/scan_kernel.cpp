@@ -1,0 +1,471 @@
+// The scanline walk of Weiler and Ertl 2001, section 4, for eight elements and eight scanlines at a time.
+//
+// Each face of an element is solved for the scan axis, s >= A + B t + C r or s <= A + B t + C r, so a scanline's ends are a maximum and a
+// minimum of at most three such planes. Planes are moved outwards by a bound on all rounding, so no point of the element is lost; elements for
+// which that bound would let a point outside be covered go to scanElementExactly. Every operation is a single
+// IEEE operation in a fixed order, so every instruction set gives the same bits.
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "software/scan.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "software/scan_kernel.cpp"
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#ifndef TESSERA_SCAN_KERNEL_COMMON
+#define TESSERA_SCAN_KERNEL_COMMON
+namespace tessera::scan_kernel {
+
+inline constexpr int kBatch = 8;
+inline constexpr double kUnit = 0x1p-53;
+/// An axis other than x is scanned when the element is this many times longer along it: rows along x are contiguous in memory.
+inline constexpr double kAxisGain = 4.0;
+/// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or everywhere.
+inline constexpr double kParallel = 1e200;
+
+/// Setup of eight elements, lane by lane.
+struct alignas(64) Batch {
+    double whole[4][3][kBatch], part[4][3][kBatch];   // node places
+    double planeA[4][kBatch], planeB[4][kBatch], planeC[4][kBatch];
+    double lower[4][kBatch];                          // 1 when face i bounds s from below
+    double base[3][kBatch];                           // first voxel, x y z
+    double axis[kBatch];                              // scan axis
+    double minS[kBatch], maxS[kBatch];                // widened bounds
+    double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];   // whole numbers
+    double easy[kBatch];
+    double gradient[4][3][kBatch], constant[4][kBatch];   // barycentrics: constant + gradient . (s, t, r)
+};
+
+/// A channel of eight elements: value = constant + s, t, r times the gradient, limited to [low, high].
+struct alignas(64) BatchChannel {
+    double node[4][kBatch];
+    double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
+    float low[kBatch], high[kBatch];
+    bool finite[kBatch];
+};
+
+/// Rows of a group of eight scanlines for a strip of `count` rows along t: lane -> (t, r) offset.
+struct alignas(64) RowTable {
+    double t[kBatch + 1][kBatch], r[kBatch + 1][kBatch];
+    int perVector[kBatch + 1];   // rows along r in one group
+};
+inline const RowTable& rowTable() {
+    static const RowTable table = [] {
+        RowTable rows{};
+        for (int count = 1; count <= kBatch; ++count) {
+            rows.perVector[count] = kBatch / count;
+            for (int lane = 0; lane < kBatch; ++lane) {
+                const bool used = lane < count * rows.perVector[count];
+                rows.t[count][lane] = lane % count;
+                // An unused lane lies beyond every element.
+                rows.r[count][lane] = used ? lane / count : 1e18;
+            }
+        }
+        return rows;
+    }();
+    return table;
+}
+
+struct Scratch {
+    Batch batch;
+    std::vector<BatchChannel> channels;
+    std::vector<float> first, step;   // channels x kBatch, channels
+};
+
+}  // namespace tessera::scan_kernel
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace tessera::scan_kernel::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<double, kBatch>;
+using V = hn::VFromD<D>;
+
+HWY_INLINE V abs3(V a, V b, V c) { return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c)); }
+HWY_INLINE V dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
+    return hn::Add(hn::Add(hn::Mul(a0, b0), hn::Mul(a1, b1)), hn::Mul(a2, b2));
+}
+HWY_INLINE V cross1(V a, V b, V c, V d) { return hn::Sub(hn::Mul(a, b), hn::Mul(c, d)); }
+
+// Planes, bounds and gradients of the lanes from `lane` on.
+void setUpLanes(Batch& batch, std::size_t lane) {
+    const D d;
+    V v[4][3], low[3], high[3];
+    for (int a = 0; a < 3; ++a) {
+        V whole[4];
+        for (int k = 0; k < 4; ++k) whole[k] = hn::Load(d, &batch.whole[k][a][lane]);
+        const V base = hn::Min(hn::Min(whole[0], whole[1]), hn::Min(whole[2], whole[3]));
+        hn::Store(base, d, &batch.base[a][lane]);
+        for (int k = 0; k < 4; ++k)
+            v[k][a] = hn::Add(hn::Sub(whole[k], base), hn::Load(d, &batch.part[k][a][lane]));
+        low[a] = hn::Min(hn::Min(v[0][a], v[1][a]), hn::Min(v[2][a], v[3][a]));
+        high[a] = hn::Max(hn::Max(v[0][a], v[1][a]), hn::Max(v[2][a], v[3][a]));
+    }
+
+    // The scan axis, and the element turned so that s is along it: x: (x, y, z), y: (y, x, z), z: (z, x, y).
+    const V extentX = hn::Sub(high[0], low[0]), extentY = hn::Sub(high[1], low[1]), extentZ = hn::Sub(high[2], low[2]);
+    const V needed = hn::Mul(hn::Set(d, kAxisGain), hn::Add(extentX, hn::Set(d, 1.0)));
+    const auto alongY = hn::And(hn::Gt(extentY, needed), hn::Ge(extentY, extentZ));
+    const auto alongZ = hn::And(hn::Gt(extentZ, needed), hn::Gt(extentZ, extentY));
+    const auto alongX = hn::Not(hn::Or(alongY, alongZ));
+    hn::Store(hn::IfThenElse(alongZ, hn::Set(d, 2.0), hn::IfThenElseZero(alongY, hn::Set(d, 1.0))), d, &batch.axis[lane]);
+    const auto turn = [&](V& a, V& b, V& c) {
+        const V s = hn::IfThenElse(alongZ, c, hn::IfThenElse(alongY, b, a));
+        const V t = hn::IfThenElse(alongX, b, a);
+        const V r = hn::IfThenElse(alongZ, b, c);
+        a = s;
+        b = t;
+        c = r;
+    };
+    for (int k = 0; k < 4; ++k) turn(v[k][0], v[k][1], v[k][2]);
+    turn(low[0], low[1], low[2]);
+    turn(high[0], high[1], high[2]);
+    const V slack = hn::Set(d, kBoxSlack);
+    hn::Store(hn::Sub(low[0], slack), d, &batch.minS[lane]);
+    hn::Store(hn::Add(high[0], slack), d, &batch.maxS[lane]);
+    hn::Store(hn::Ceil(hn::Sub(low[1], slack)), d, &batch.minT[lane]);
+    hn::Store(hn::Floor(hn::Add(high[1], slack)), d, &batch.maxT[lane]);
+    hn::Store(hn::Ceil(hn::Sub(low[2], slack)), d, &batch.minR[lane]);
+    hn::Store(hn::Floor(hn::Add(high[2], slack)), d, &batch.maxR[lane]);
+
+    // Barycentric gradients: cross products of two edges over six times the volume.
+    V e[3][3];
+    for (int k = 0; k < 3; ++k)
+        for (int a = 0; a < 3; ++a) e[k][a] = hn::Sub(v[k + 1][a], v[0][a]);
+    V n[3][3];
+    for (int k = 0; k < 3; ++k) {
+        const V* p = e[(k + 1) % 3];
+        const V* q = e[(k + 2) % 3];
+        n[k][0] = cross1(p[1], q[2], p[2], q[1]);
+        n[k][1] = cross1(p[2], q[0], p[0], q[2]);
+        n[k][2] = cross1(p[0], q[1], p[1], q[0]);
+    }
+    const V det = dot3(e[0][0], e[0][1], e[0][2], n[0][0], n[0][1], n[0][2]);
+    const V one = hn::Set(d, 1.0);
+    const V inverse = hn::Div(one, det);
+    V g[4][3], c[4];
+    for (int k = 1; k < 4; ++k) {
+        for (int a = 0; a < 3; ++a) g[k][a] = hn::Mul(n[k - 1][a], inverse);
+        c[k] = hn::Neg(dot3(g[k][0], g[k][1], g[k][2], v[0][0], v[0][1], v[0][2]));
+    }
+    for (int a = 0; a < 3; ++a) g[0][a] = hn::Neg(hn::Add(hn::Add(g[1][a], g[2][a]), g[3][a]));
+    c[0] = hn::Sub(one, hn::Add(hn::Add(c[1], c[2]), c[3]));
+
+    // The bound T on the rounding of a barycentric coordinate anywhere in the bounding box.
+    const V size0 = hn::Sub(high[0], low[0]), size1 = hn::Sub(high[1], low[1]), size2 = hn::Sub(high[2], low[2]);
+    V steepest = hn::Zero(d);
+    for (int k = 0; k < 4; ++k) steepest = hn::Max(steepest, abs3(g[k][0], g[k][1], g[k][2]));
+    const V boxVolume = hn::Mul(hn::Mul(size0, size1), size2);
+    const V longest = hn::Max(hn::Max(size0, size1), size2);
+    const V fromDet = hn::Mul(hn::Set(d, 256.0), hn::Abs(hn::Mul(boxVolume, inverse)));
+    const V fromPlace = hn::Mul(hn::Mul(hn::Set(d, 128.0), steepest), hn::Add(longest, hn::Set(d, 2.0)));
+    const V dilation = hn::Mul(hn::Set(d, kUnit), hn::Add(fromDet, fromPlace));
+    const V spread = hn::Mul(dilation, hn::Add(hn::Add(size0, size1), size2));
+    const auto easy = hn::And(hn::Le(dilation, hn::Set(d, kLargestSlack)), hn::Le(spread, hn::Set(d, kLargestSlackTimesSize)));
+    hn::Store(hn::IfThenElseZero(easy, one), d, &batch.easy[lane]);
+
+    const V tiny = hn::Set(d, 1.0 / kParallel);
+    for (int k = 0; k < 4; ++k) {
+        const V s = g[k][0];
+        const V reciprocal = hn::IfThenElse(hn::Lt(hn::Abs(s), tiny), hn::Set(d, kParallel), hn::Div(one, s));
+        hn::Store(hn::Neg(hn::Mul(hn::Add(dilation, c[k]), reciprocal)), d, &batch.planeA[k][lane]);
+        hn::Store(hn::Neg(hn::Mul(g[k][1], reciprocal)), d, &batch.planeB[k][lane]);
+        hn::Store(hn::Neg(hn::Mul(g[k][2], reciprocal)), d, &batch.planeC[k][lane]);
+        hn::Store(hn::IfThenElseZero(hn::Gt(reciprocal, hn::Zero(d)), one), d, &batch.lower[k][lane]);
+        hn::Store(c[k], d, &batch.constant[k][lane]);
+        for (int a = 0; a < 3; ++a) hn::Store(g[k][a], d, &batch.gradient[k][a][lane]);
+    }
+}
+
+// value = f0 + sum over i of (fi - f0) b_i.
+void setUpChannelLanes(const Batch& batch, BatchChannel& channel, std::size_t lane) {
+    const D d;
+    const V f0 = hn::Load(d, &channel.node[0][lane]);
+    V sum[4] = {f0, hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    for (int k = 1; k < 4; ++k) {
+        const V df = hn::Sub(hn::Load(d, &channel.node[k][lane]), f0);
+        sum[0] = hn::Add(sum[0], hn::Mul(df, hn::Load(d, &batch.constant[k][lane])));
+        for (int a = 0; a < 3; ++a)
+            sum[a + 1] = hn::Add(sum[a + 1], hn::Mul(df, hn::Load(d, &batch.gradient[k][a][lane])));
+    }
+    hn::Store(sum[0], d, &channel.constant[lane]);
+    hn::Store(sum[1], d, &channel.gradientS[lane]);
+    hn::Store(sum[2], d, &channel.gradientT[lane]);
+    hn::Store(sum[3], d, &channel.gradientR[lane]);
+}
+
+void loadBatch(const ScanInput& input, const std::int32_t* elements, int count, Batch& batch) {
+    for (int lane = 0; lane < kBatch; ++lane) {
+        const auto& tet = input.mesh.tets[std::size_t(elements[lane < count ? lane : 0])];
+        for (std::size_t k = 0; k < 4; ++k) {
+            const NodeFrame::Node& node = input.frame.nodes[std::size_t(tet[k])];
+            for (int a = 0; a < 3; ++a) {
+                batch.whole[k][a][lane] = node.whole[a];
+                batch.part[k][a][lane] = node.part[a];
+            }
+        }
+    }
+    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpLanes(batch, lane);
+}
+
+void loadChannel(const ScanInput& input, const ScanChannel& source, const std::int32_t* elements, int count,
+                 const Batch& batch, BatchChannel& channel) {
+    for (int lane = 0; lane < kBatch; ++lane) {
+        const std::int32_t element = elements[lane < count ? lane : 0];
+        const auto& tet = input.mesh.tets[std::size_t(element)];
+        float low = std::numeric_limits<float>::infinity(), high = -low;
+        bool finite = true;
+        for (std::size_t k = 0; k < 4; ++k) {
+            const double value = source.at(source.cell ? element : tet[k]);
+            const float rounded = float(value);
+            finite = finite && std::isfinite(rounded);
+            low = rounded < low ? rounded : low;
+            high = rounded > high ? rounded : high;
+            channel.node[k][lane] = value;
+        }
+        channel.low[lane] = low;
+        channel.high[lane] = high;
+        channel.finite[lane] = finite;
+        if (!finite)
+            for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
+    }
+    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpChannelLanes(batch, channel, lane);
+}
+
+// The state of one element while its scanlines are walked.
+struct Walk {
+    const ScanInput& input;
+    const ScanOutput& output;
+    Scratch& scratch;
+    ScanCounts& counts;
+    std::int32_t element;
+    int lane;
+    std::int64_t strideS, strideT, strideR;
+    std::int64_t origin;   // offset of the element's first voxel in the block (may lie outside)
+    int axis;
+    std::optional<ElementDepth> depth;
+};
+
+HWY_INLINE float limited(float value, float low, float high) {
+    value = value < low ? low : value;
+    return value > high ? high : value;
+}
+
+Vec3i pointOf(const Walk& walk, std::int64_t s, std::int64_t t, std::int64_t r) {
+    const Batch& batch = walk.scratch.batch;
+    const std::int64_t local[3] = {walk.axis == 0 ? s : t, walk.axis == 1 ? s : (walk.axis == 0 ? t : r),
+                                   walk.axis == 2 ? s : r};
+    Vec3i p;
+    for (int a = 0; a < 3; ++a) p[a] = int(std::int64_t(batch.base[a][walk.lane]) + local[a]);
+    return p;
+}
+
+// Points of the run that another element covers already: the deeper one owns them.
+HWY_NOINLINE void writeContestedRun(Walk& walk, std::int64_t offset, std::int64_t s, std::int64_t t, std::int64_t r,
+                                    std::int64_t length, std::int64_t skipped, int row) {
+    const Scratch& scratch = walk.scratch;
+    for (std::int64_t k = 0; k < length; ++k, offset += walk.strideS) {
+        std::int32_t& owner = walk.output.owner[offset];
+        if (owner == kNoOwner) {
+            owner = walk.element;
+        } else {
+            ++walk.counts.contested;
+            if (!walk.depth) walk.depth.emplace(walk.input.mesh, walk.input.frame, walk.element);
+            if (!contestPoint(walk.input, walk.output, walk.element, *walk.depth, pointOf(walk, s + k, t, r))) continue;
+        }
+        for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
+            const BatchChannel& channel = scratch.channels[c];
+            const float value = scratch.first[c * kBatch + std::size_t(row)] + float(skipped + k) * scratch.step[c];
+            walk.output.values[c][offset] =
+                channel.finite[walk.lane] ? limited(value, channel.low[walk.lane], channel.high[walk.lane])
+                                          : std::numeric_limits<float>::quiet_NaN();
+        }
+    }
+}
+
+// One run of voxels, counted from the run's own first voxel so that values don't depend on the region.
+HWY_INLINE void writeRun(Walk& walk, double start, double first, double last, double tLocal, double rLocal, int row) {
+    const std::int64_t s = std::int64_t(first), t = std::int64_t(tLocal), r = std::int64_t(rLocal);
+    const std::int64_t length = std::int64_t(last) - s + 1, skipped = s - std::int64_t(start);
+    const std::int64_t offset = walk.origin + s * walk.strideS + t * walk.strideT + r * walk.strideR;
+    std::int32_t* const owner = walk.output.owner + offset;
+    const std::int64_t stride = walk.strideS;
+    std::int32_t free = kNoOwner;
+    for (std::int64_t k = 0; k < length; ++k) free &= owner[k * stride];
+    if (free != kNoOwner) {
+        writeContestedRun(walk, offset, s, t, r, length, skipped, row);
+        return;
+    }
+    for (std::int64_t k = 0; k < length; ++k) owner[k * stride] = walk.element;
+    const Scratch& scratch = walk.scratch;
+    for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
+        const BatchChannel& channel = scratch.channels[c];
+        const float value = scratch.first[c * kBatch + std::size_t(row)], step = scratch.step[c];
+        const float low = channel.low[walk.lane], high = channel.high[walk.lane];
+        float* const out = walk.output.values[c] + offset;
+        if (channel.finite[walk.lane]) {
+            for (std::int64_t k = 0; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
+        } else {
+            for (std::int64_t k = 0; k < length; ++k) out[k * stride] = std::numeric_limits<float>::quiet_NaN();
+        }
+    }
+}
+
+// Scanlines of one element inside the region; `Lower` of the four faces, those first in `order`, bound s from below.
+template <int Lower>
+void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const double (&to)[3]) {
+    const D d;
+    const RowTable& table = rowTable();
+    const Batch& batch = walk.scratch.batch;
+    const int lane = walk.lane;
+    const std::size_t channels = walk.input.channels.size();
+    const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]);
+    const V fromS = hn::Set(d, from[0]), toS = hn::Set(d, to[0]), toR = hn::Set(d, to[2]);
+    alignas(64) double start[kBatch], first[kBatch], last[kBatch], rows[kBatch], ts[kBatch], rs[kBatch];
+    for (double t0 = from[1]; t0 <= to[1]; t0 += kBatch) {
+        const int count = int(std::min<double>(kBatch, to[1] - t0 + 1));
+        const int perVector = table.perVector[count];
+        for (double r0 = from[2]; r0 <= to[2]; r0 += perVector) {
+            unsigned hit = 0;
+            for (std::size_t q = 0; q < kBatch; q += hn::Lanes(d)) {
+                const V t = hn::Add(hn::Set(d, t0), hn::Load(d, &table.t[count][q]));
+                const V r = hn::Add(hn::Set(d, r0), hn::Load(d, &table.r[count][q]));
+                V low = minS, high = maxS;
+                for (int i = 0; i < 4; ++i) {
+                    const int face = order[i];
+                    const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane]),
+                                                    hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
+                                            hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
+                    if (i < Lower)
+                        low = hn::Max(low, bound);
+                    else
+                        high = hn::Min(high, bound);
+                }
+                const V begin = hn::Ceil(low), end = hn::Floor(high);
+                const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
+                const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
+                if (hn::AllFalse(d, inside)) continue;
+                hn::Store(begin, d, start + q);
+                hn::Store(clippedBegin, d, first + q);
+                hn::Store(clippedEnd, d, last + q);
+                hn::Store(t, d, ts + q);
+                hn::Store(r, d, rs + q);
+                std::uint8_t bits[8] = {};
+                hn::StoreMaskBits(d, inside, bits);
+                hit |= unsigned(bits[0]) << q;
+                for (std::size_t c = 0; c < channels; ++c) {
+                    const BatchChannel& channel = walk.scratch.channels[c];
+                    const V value = hn::Add(hn::Add(hn::Add(hn::Set(d, channel.constant[lane]),
+                                                            hn::Mul(hn::Set(d, channel.gradientT[lane]), t)),
+                                                    hn::Mul(hn::Set(d, channel.gradientR[lane]), r)),
+                                            hn::Mul(hn::Set(d, channel.gradientS[lane]), begin));
+                    hn::Store(value, d, rows);
+                    for (std::size_t i = 0; i < hn::Lanes(d); ++i)
+                        walk.scratch.first[c * kBatch + q + i] = float(rows[i]);
+                }
+            }
+            walk.counts.scanlines += count * perVector;
+            for (; hit; hit &= hit - 1) {
+                const int row = std::countr_zero(hit);
+                writeRun(walk, start[row], first[row], last[row], ts[row], rs[row], row);
+            }
+        }
+    }
+}
+
+void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scratch, std::int32_t element, int lane,
+                 ScanCounts& counts) {
+    const Batch& batch = scratch.batch;
+    const int axis = int(batch.axis[lane]);
+    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};   // of s, t and r
+    // The part of the element's rows that lies in the region, relative to its first voxel.
+    double from[3], to[3];
+    for (int a = 0; a < 3; ++a) {
+        from[a] = output.region.min[axes[a]] - batch.base[axes[a]][lane];
+        to[a] = output.region.max[axes[a]] - 1 - batch.base[axes[a]][lane];
+    }
+    from[1] = std::max(from[1], batch.minT[lane]);
+    to[1] = std::min(to[1], batch.maxT[lane]);
+    from[2] = std::max(from[2], batch.minR[lane]);
+    to[2] = std::min(to[2], batch.maxR[lane]);
+    if (!(from[1] <= to[1] && from[2] <= to[2])) return;
+
+    int order[4], lower = 0, upper = 4;
+    for (int k = 0; k < 4; ++k) {
+        if (batch.lower[k][lane] != 0.0)
+            order[lower++] = k;
+        else
+            order[--upper] = k;
+    }
+    for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
+        const double limit = std::numeric_limits<float>::max();
+        scratch.step[c] = float(std::clamp(scratch.channels[c].gradientS[lane], -limit, limit));
+    }
+    Walk walk{input, output, scratch, counts, element, lane, output.stride[axes[0]], output.stride[axes[1]],
+              output.stride[axes[2]], 0, axis, {}};
+    for (int a = 0; a < 3; ++a)
+        walk.origin += (std::int64_t(batch.base[a][lane]) - output.blockBox.min[a]) * output.stride[a];
+    switch (lower) {
+        case 0: walkRows<0>(walk, order, from, to); break;
+        case 1: walkRows<1>(walk, order, from, to); break;
+        case 2: walkRows<2>(walk, order, from, to); break;
+        case 3: walkRows<3>(walk, order, from, to); break;
+        default: walkRows<4>(walk, order, from, to); break;
+    }
+}
+
+void scan(const ScanInput& input, const ScanOutput& output, std::span<const std::int32_t> elements, ScanCounts& counts) {
+    static thread_local Scratch scratch;
+    scratch.channels.resize(input.channels.size());
+    scratch.first.resize(input.channels.size() * kBatch);
+    scratch.step.resize(input.channels.size());
+    for (std::size_t begin = 0; begin < elements.size(); begin += kBatch) {
+        const int count = int(std::min<std::size_t>(kBatch, elements.size() - begin));
+        const std::int32_t* batchElements = elements.data() + begin;
+        loadBatch(input, batchElements, count, scratch.batch);
+        for (std::size_t c = 0; c < input.channels.size(); ++c)
+            loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);
+        for (int lane = 0; lane < count; ++lane) {
+            if (scratch.batch.easy[lane] != 0.0)
+                walkElement(input, output, scratch, batchElements[lane], lane, counts);
+            else
+                scanElementExactly(input, output, batchElements[lane], counts);
+        }
+    }
+}
+
+}  // namespace tessera::scan_kernel::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace tessera {
+
+const std::vector<ScanTarget>& scanTargets() {
+    static const std::vector<ScanTarget> targets = [] {
+        std::vector<ScanTarget> found;
+        [[maybe_unused]] const auto supported = hwy::SupportedTargets();
+#if HWY_TARGETS & HWY_AVX3
+        if (supported & HWY_AVX3) found.push_back({"AVX3", &scan_kernel::N_AVX3::scan});
+#endif
+#if HWY_TARGETS & HWY_AVX2
+        if (supported & HWY_AVX2) found.push_back({"AVX2", &scan_kernel::N_AVX2::scan});
+#endif
+#if HWY_TARGETS & HWY_SSE4
+        if (supported & HWY_SSE4) found.push_back({"SSE4", &scan_kernel::N_SSE4::scan});
+#endif
+        found.push_back({"baseline", &scan_kernel::HWY_NAMESPACE::scan});
+        return found;
+    }();
+    return targets;
+}
+
+}  // namespace tessera
+#endif

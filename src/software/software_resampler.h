@@ -1,0 +1,21 @@
+#pragma once
+
+#include "resample/resampler.h"
+
+namespace tessera {
+
+/// The scanline resampler on the processor.
+/// Based on: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive Visualization of
+/// Unstructured Grids, IEEE Visualization 2001, section 4.
+class SoftwareResampler : public Resampler {
+  public:
+    std::string_view name() const override { return "software"; }
+    std::string_view description() const override { return "scanline walk on the processor, exact coverage"; }
+    std::vector<std::string> targets() const override;
+    double spillBoundVoxels() const override;
+    double placeBoundVoxels() const override;
+    std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
+                                         std::string_view target) const override;
+};
+
+}  // namespace tessera

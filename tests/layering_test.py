@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+"""Checks every #include in the tree, and every link list in CMake, against the table of folders in docs/architecture.md."""
+
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+HEAVY_FILES = 6  # .cpp files of src/io that may include OpenVDB, and as many that may include VTK
+
+
+def read_table():
+    """Folder -> set of layers its row lists."""
+    rows = {}
+    for line in (ROOT / "docs/architecture.md").read_text().splitlines():
+        match = re.match(r"\| `(?:src/)?(\w+)/` \|[^|]*\|([^|]*)\|$", line)
+        if match:
+            rows[match.group(1)] = set(re.findall(r"\w+", match.group(2)))
+    return rows
+
+
+def closure(rows, name):
+    reached, todo = {name}, [name]
+    while todo:
+        for other in rows[todo.pop()]:
+            if other not in reached:
+                reached.add(other)
+                todo.append(other)
+    return reached
+
+
+def source_files(folder):
+    return sorted(p for ext in ("*.h", "*.cpp") for p in folder.rglob(ext))
+
+
+def check_includes(rows, problems):
+    layers = {p.name for p in (ROOT / "src").iterdir() if p.is_dir()}
+    for missing in sorted(layers - set(rows)):
+        problems.append(f"src/{missing}/ has no row in docs/architecture.md")
+    checked = 0
+    for name in rows:
+        folder = ROOT / "src" / name if name in layers else ROOT / name
+        if not folder.is_dir():
+            problems.append(f"the table names {name}, and there is no such folder")
+            continue
+        allowed = closure(rows, name)
+        for path in source_files(folder):
+            if "consumer" in path.parts:  # a project of its own
+                continue
+            checked += 1
+            for include in re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(), re.M):
+                top = include.split("/")[0]
+                if "/" in include and top in layers and top not in allowed:
+                    problems.append(f"{path.relative_to(ROOT)} includes {include}: {name} may not include {top}")
+    return checked
+
+
+def check_links(rows, problems):
+    for name in rows:
+        cmake = ROOT / "src" / name / "CMakeLists.txt"
+        if not cmake.is_file():
+            continue
+        text = re.sub(r"#[^\n]*", "", cmake.read_text())
+        call = re.search(r"tessera_layer\(\s*" + name + r"\b(.*?)\)\s*$", text, re.S | re.M)
+        if not call:
+            problems.append(f"{cmake.relative_to(ROOT)} makes no layer {name}")
+            continue
+        linked = re.search(r"(?<![A-Z_])LINK\b([a-z\s]*)", call.group(1))
+        links = set(linked.group(1).split()) if linked else set()
+        if closure({**rows, name: links}, name) != closure(rows, name):
+            problems.append(f"{cmake.relative_to(ROOT)} links {sorted(links)}, the table says {sorted(rows[name])}")
+
+
+def check_heavy(problems):
+    for library, pattern in (("OpenVDB", r"openvdb/"), ("VTK", r"vtk\w+\.h")):
+        users = []
+        for folder in ("src", "apps", "tests"):
+            for path in source_files(ROOT / folder):
+                if re.search(r"^\s*#\s*include\s*[<\"]" + pattern, path.read_text(), re.M):
+                    users.append(path.relative_to(ROOT))
+        for path in users:
+            in_io = path.parts[:2] == ("src", "io") and path.suffix == ".cpp"
+            in_test = path.parts[0] == "tests" and path.suffix == ".cpp"
+            if not in_io and not in_test:
+                problems.append(f"{path} includes {library}; only .cpp files of src/io may")
+        if len([p for p in users if p.parts[0] == "src"]) > HEAVY_FILES:
+            problems.append(f"{library} is included in more than {HEAVY_FILES} files of src/io: {users}")
+
+
+def main():
+    problems = []
+    rows = read_table()
+    if len(rows) < 9:
+        problems.append("docs/architecture.md has no readable table of folders")
+    else:
+        checked = check_includes(rows, problems)
+        if checked < 20:
+            problems.append(f"only {checked} source files found")
+        check_links(rows, problems)
+        check_heavy(problems)
+    for problem in problems:
+        print(problem)
+    print(f"layering: {len(problems)} problems")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
