@@ -64,7 +64,10 @@ class ResampleRun {
     int run();
 
   private:
-    void findSeriesRanges(const std::vector<Step>& steps);
+    MeshFile read(const Step& step);
+    RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection) const;
+    void surveySeries(const std::vector<Step>& steps);
+    void surveySpacing(const TetMesh& mesh);
     Json runStep(const Step& step);
     Json dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times);
     Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
@@ -80,7 +83,24 @@ class ResampleRun {
     Session session_;
     StageTimes allTimes_;
     Json series_;
+    std::optional<FixedFrame> seriesFrame_;
 };
+
+void widenRanges(std::vector<FieldSummary>& all, const std::vector<FieldSummary>& more) {
+    for (const FieldSummary& field : more) {
+        const auto same = std::find_if(all.begin(), all.end(), [&](const FieldSummary& other) {
+            return other.name == field.name && other.location == field.location;
+        });
+        if (same == all.end()) {
+            all.push_back(field);
+            continue;
+        }
+        for (std::size_t c = 0; c < std::min(same->ranges.size(), field.ranges.size()); ++c) {
+            same->ranges[c].min = std::min(same->ranges[c].min, field.ranges[c].min);
+            same->ranges[c].max = std::max(same->ranges[c].max, field.ranges[c].max);
+        }
+    }
+}
 
 int ResampleRun::run() {
     const std::vector<Step> steps = listSteps(arguments_);
@@ -91,7 +111,7 @@ int ResampleRun::run() {
         if (settings_.refine.resolution > 0 || settings_.refine.spacingWorld > 0)
             throw InputError("--like sets the spacing: --resolution and --spacing can't be given with it");
     }
-    if (steps.size() > 1) findSeriesRanges(steps);
+    if (steps.size() > 1) surveySeries(steps);
     Json reports = Json::array();
     for (const Step& step : steps) reports.push_back(runStep(step));
     if (arguments_.common.jsonPath.empty()) return 0;
@@ -106,42 +126,56 @@ int ResampleRun::run() {
     return 0;
 }
 
-void ResampleRun::findSeriesRanges(const std::vector<Step>& steps) {
+MeshFile ResampleRun::read(const Step& step) {
+    const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
+    return readMesh(step.input, options, session_.execution);
+}
+
+RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {
+    RefineOptions options = settings_.refine;
+    for (const std::string& name : settings_.errorFields) options.errorFields.push_back(findSelected(mesh, selection.fields, name));
+    return options;
+}
+
+/// One lattice and one value range for all steps need a look at all of them first.
+void ResampleRun::surveySeries(const std::vector<Step>& steps) {
+    const bool frameGiven = settings_.refine.frame.has_value();
     std::vector<FieldSummary> ranges;
     Box3d bounds;
     for (std::size_t i = 0; i < steps.size(); ++i) {
         session_.execution.report("series", std::int64_t(i), std::int64_t(steps.size()));
-        const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-        const TetMesh mesh = readMesh(steps[i].input, options, session_.execution).mesh;
+        const TetMesh mesh = read(steps[i]).mesh;
         bounds.include(mesh.boundsWorld());
-        for (FieldSummary& field : summarizeFields(mesh)) {
-            const auto same = std::find_if(ranges.begin(), ranges.end(), [&](const FieldSummary& other) {
-                return other.name == field.name && other.location == field.location;
-            });
-            if (same == ranges.end()) {
-                ranges.push_back(std::move(field));
-                continue;
-            }
-            for (std::size_t c = 0; c < std::min(same->ranges.size(), field.ranges.size()); ++c) {
-                same->ranges[c].min = std::min(same->ranges[c].min, field.ranges[c].min);
-                same->ranges[c].max = std::max(same->ranges[c].max, field.ranges[c].max);
-            }
-        }
+        widenRanges(ranges, summarizeFields(mesh));
+        if (!frameGiven) surveySpacing(mesh);
     }
+    if (!frameGiven) settings_.refine.frame = seriesFrame_;
+    settings_.refine.resolution = 0;   // the frame holds the spacing from here on
+    settings_.refine.spacingWorld = 0;
     series_ = seriesJson(steps.size(), bounds, ranges);
-    session_.print(fmt::format("series of {} steps\n{}", steps.size(), fieldsText(ranges)));
+    session_.print(fmt::format("series of {} steps, finest spacing {:.6g}\n{}", steps.size(), settings_.refine.frame->spacingWorld,
+                               fieldsText(ranges)));
+}
+
+/// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing shows well.
+void ResampleRun::surveySpacing(const TetMesh& mesh) {
+    const FieldSelection selection = selectFields(mesh, settings_.fields);
+    const RefineOptions options = stepOptions(mesh, selection);
+    const BrickTree tree = options.criterion == Criterion::error
+                               ? refineAndResample(mesh, selection.fields, resampler_, options, session_.execution).tree
+                               : planBricks(mesh, options, session_.execution, selection.channels);
+    if (!seriesFrame_ || tree.spacingWorld() < seriesFrame_->spacingWorld)
+        seriesFrame_ = FixedFrame{tree.originWorld(), tree.spacingWorld()};
 }
 
 Json ResampleRun::runStep(const Step& step) {
     StageTimes times;
     Timer timer;
-    const ReadOptions readOptions{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-    const MeshFile file = readMesh(step.input, readOptions, session_.execution);
+    const MeshFile file = read(step);
     times.readMs = timer.elapsedMs();
     const FieldSelection selection = selectFields(file.mesh, settings_.fields);
-    RefineOptions options = settings_.refine;
-    for (const std::string& name : settings_.errorFields)
-        options.errorFields.push_back(findSelected(file.mesh, selection.fields, name));
+    checkOutputFields(selection.outputs);
+    const RefineOptions options = stepOptions(file.mesh, selection);
     session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
 
     Json report{{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "resample"},
@@ -160,19 +194,23 @@ Json ResampleRun::runStep(const Step& step) {
 Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times) {
     Timer timer;
     BrickTree tree;
+    std::vector<std::string> notes;
     if (options.criterion == Criterion::error) {
         // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
         BrickResult result = refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
         tree = std::move(result.tree);
+        notes = std::move(result.notes);
     } else {
-        tree = planBricks(file.mesh, options, session_.execution);
+        tree = planBricks(file.mesh, options, session_.execution, selection.channels, &notes);
     }
     times.planMs = timer.elapsedMs();
     const PlanEstimate estimate = estimatePlan(tree, selection.channels);
     const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels, resampler_, session_.execution);
-    session_.print(estimateText(estimate, cost.levelsMs, cost.flatMs) + "  nothing was written\n");
-    if (!settings_.refine.frame) settings_.refine.frame = FixedFrame{tree.originWorld(), tree.spacingWorld()};
+    std::string text = estimateText(estimate, cost.levelsMs, cost.flatMs);
+    for (const std::string& note : notes) text += "  " + note + "\n";
+    session_.print(text + "  nothing was written\n");
     Json json = levelsJson(tree, summarizeLevels(tree, {}));
+    json["notes"] = notes;
     json["estimate"] = estimateJson(estimate, cost.levelsMs, cost.flatMs);
     return json;
 }
@@ -206,9 +244,6 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     times.verifyMs = result.times.verifyMs;
     for (std::size_t f = 0; f < selection.outputs.size() && f < result.report.fields.size(); ++f)
         result.report.fields[f].name = selection.outputs[f].name;   // grid names are unique, names in the mesh need not be
-    // The first step decides for the whole series, so that nothing flickers.
-    if (!settings_.refine.frame)
-        settings_.refine.frame = FixedFrame{result.tree.originWorld(), result.tree.spacingWorld()};
     const std::vector<LevelSummary> levels = summarizeLevels(result.tree, result.store);
     const std::int64_t sampleBytes = result.store.memoryBytes();
     const VdbWriteResult written = write(step, file, selection, result, times);
@@ -221,6 +256,7 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
         json["refinement"] = {{"max_error", options.maxError}, {"relative", options.maxErrorIsRelative},
                               {"measure", arguments_.errorMeasure}, {"bounded", result.bounded},
                               {"stopped_because", result.stoppedBecause}, {"rounds", result.rounds}};
+    json["notes"] = result.notes;
     json["statistics"] = statisticsJson(result.statistics);
     json["write"] = writeResultJson(written);
     json["sample_bytes"] = sampleBytes;
@@ -233,6 +269,7 @@ void ResampleRun::printResult(const Step& step, const BrickResult& result, const
     if (settings_.refine.criterion == Criterion::error)
         text += result.bounded ? "  the error is within the bound\n"
                                : fmt::format("  the error is NOT within the bound: {}\n", result.stoppedBecause);
+    for (const std::string& note : result.notes) text += "  " + note + "\n";
     for (const std::string& note : written.notes) text += "  " + note + "\n";
     text += stagesText(times);
     text += fmt::format("{}: {}, {} active voxels; peak memory {}\n", step.output, formatBytes(written.fileBytes),

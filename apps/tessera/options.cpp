@@ -58,8 +58,7 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     command.add_option("--samples-per-element", a.samplesPerElement, "element-size: samples along a typical element edge")
         ->capture_default_str()
         ->group(group);
-    command.add_option("--max-levels", a.maxLevels, "levels of spacing at most, each twice the one below")
-        ->capture_default_str()
+    command.add_option("--max-levels", a.maxLevels, "levels of spacing at most, each twice the one below (default: 8; for error no bound)")
         ->group(group);
     command.add_option("--max-error", a.maxError, "error: bound in field units, or a share of each field's range such as 1%")
         ->group(group);
@@ -107,8 +106,9 @@ void checkRanges(const ResampleArguments& a) {
     require(!(a.spacing && a.resolution), "--spacing and --resolution exclude each other");
     requirePositive("--samples-per-element", a.samplesPerElement);
     require(a.samplesPerElement <= 1000, fmt::format("--samples-per-element: expected at most 1000, got {}", a.samplesPerElement));
-    require(a.maxLevels >= 1 && a.maxLevels <= kLargestLevels,
-            fmt::format("--max-levels: expected 1 to {}, got {}", kLargestLevels, a.maxLevels));
+    if (a.maxLevels)
+        require(*a.maxLevels >= 1 && *a.maxLevels <= kLargestLevels,
+                fmt::format("--max-levels: expected 1 to {}, got {}", kLargestLevels, *a.maxLevels));
     require(a.brickSize == 8 || a.brickSize == 16 || a.brickSize == 32 || a.brickSize == 64,
             fmt::format("--brick-size: expected 8, 16, 32 or 64, got {}", a.brickSize));
     require(a.extendLayers >= 0 && a.extendLayers <= kLargestExtend,
@@ -141,7 +141,7 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     r.resolution = a.resolution.value_or(0);
     r.spacingWorld = a.spacing.value_or(0);
     r.samplesPerElement = a.samplesPerElement;
-    r.maxLevels = a.maxLevels;
+    r.maxLevels = a.maxLevels.value_or(0);
     r.measure = a.errorMeasure == "rms" ? ErrorMeasure::rms : ErrorMeasure::max;
     if (!a.maxVoxels.empty()) r.maxVoxels = parseCount("--max-voxels", a.maxVoxels, false);
     if (!a.maxMemory.empty()) r.maxMemoryBytes = parseCount("--max-memory", a.maxMemory, true);

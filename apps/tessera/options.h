@@ -30,11 +30,10 @@ struct ResampleArguments {
     CommonOptions common;
     std::string input, output;
     std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max", algorithm = "software";
-    std::optional<int> resolution;
+    std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;
     std::optional<std::string> maxError;
     double samplesPerElement = 2;
-    int maxLevels = 8;
     int brickSize = 16;
     int extendLayers = 0;
     double background = 0;

@@ -33,8 +33,12 @@ struct BrickRange {
 };
 
 BrickRange bricksMeeting(const Box3d& index, int brickCells) {
+    // What lies beyond the range of indices is far outside the bounds; it must not overflow here.
+    constexpr double kFar = 1 << 30;
     const double inverse = 1.0 / brickCells;
-    return {Vec3i(glm::floor(index.min * inverse)), Vec3i(glm::floor((index.max + kBrickSlackVoxels) * inverse))};
+    const Vec3d low = glm::clamp(index.min * inverse, Vec3d(-kFar), Vec3d(kFar));
+    const Vec3d high = glm::clamp((index.max + kBrickSlackVoxels) * inverse, Vec3d(-kFar), Vec3d(kFar));
+    return {Vec3i(glm::floor(low)), Vec3i(glm::floor(high))};
 }
 
 Box3d boundsInIndexSpace(const TetMesh& mesh, const PlanFrame& frame, int depth) {
@@ -47,8 +51,8 @@ BrickRange clippedRange(const TetMesh& mesh, const PlanFrame& frame, int depth) 
     Box3d box = boundsInIndexSpace(mesh, frame, depth);
     if (frame.boundsWorld) {
         const double inverse = 1.0 / frame.spacingWorld(depth);
-        box.min = glm::max(box.min, (frame.boundsWorld->min - frame.originWorld) * inverse - 2.0 - frame.brickCells);
-        box.max = glm::min(box.max, (frame.boundsWorld->max - frame.originWorld) * inverse + 2.0 + frame.brickCells);
+        box.min = glm::max(box.min, (frame.boundsWorld->min - frame.originWorld) * inverse - (2.0 + frame.brickCells));
+        box.max = glm::min(box.max, (frame.boundsWorld->max - frame.originWorld) * inverse + (2.0 + frame.brickCells));
     }
     return bricksMeeting(box, frame.brickCells);
 }
@@ -83,6 +87,7 @@ BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Executio
 
 void BrickPlan::allocateRoots(const Execution& execution) {
     const double spacing = frame_.spacingWorld(0);
+    const BrickRange all = clippedRange(*mesh_, frame_, 0);
     const std::int64_t count = mesh_->elementCount();
     std::vector<std::vector<std::pair<BrickKey, std::int32_t>>> found(
         std::size_t((count + kElementChunk - 1) / kElementChunk));
@@ -90,7 +95,8 @@ void BrickPlan::allocateRoots(const Execution& execution) {
         auto& list = found[std::size_t(begin / kElementChunk)];
         for (std::int64_t e = begin; e < end; ++e) {
             const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
-            const BrickRange range = bricksMeeting(element.bounds(), frame_.brickCells);
+            BrickRange range = bricksMeeting(element.bounds(), frame_.brickCells);
+            range = {glm::max(range.min, all.min), glm::min(range.max, all.max)};
             const bool single = range.min == range.max;
             for (int z = range.min.z; z <= range.max.z; ++z)
                 for (int y = range.min.y; y <= range.max.y; ++y)
@@ -148,7 +154,7 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
         for (std::size_t c = 0; c < 8; ++c)
             if (allowed[c] && element.boundsTouch(boxes[c])) hits[count++] = c;
         for (std::size_t i = 0; i < count; ++i)
-            if (element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
+            if (count == 1 || element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
     }
     splitSamples(brick, made);
     std::erase_if(made, [](const PlannedBrick& child) { return child.elements.empty(); });
@@ -160,7 +166,7 @@ void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick
     const double inverse = 1.0 / (frame_.spacingWorld(brick.key.level) * frame_.brickCells);
     const Vec3d middle = Vec3d(brick.key.index) + 0.5;
     for (const std::uint32_t sample : brick.samples) {
-        const Vec3d place = (placeOfSample(sample) - frame_.originWorld) * inverse;
+        const Vec3d place = placeOfSample(sample) * inverse;
         std::size_t child = std::size_t((place.x >= middle.x ? 1 : 0) | (place.y >= middle.y ? 2 : 0) |
                                         (place.z >= middle.z ? 4 : 0));
         // Rounding can put a sample just across the middle, where no element reaches: any child that touches it serves.

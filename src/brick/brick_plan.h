@@ -42,8 +42,7 @@ class BrickPlan {
 
     const PlanFrame& frame() const { return frame_; }
     std::size_t leafCount() const { return leafCount_; }
-    /// Calls for every leaf, in a fixed order.
-    void forEach(const std::function<void(PlannedBrick&)>& body);
+    /// Ascending by depth, z, y, x; valid until the next split().
     std::vector<PlannedBrick*> leaves();
     int deepest() const;
 
@@ -54,7 +53,7 @@ class BrickPlan {
     /// Level 0 is the deepest depth present, or `finestDepth` when given (>= 0).
     BrickTree tree(int finestDepth = -1) const;
 
-    /// Decides which child takes a sample: set by who uses samples. Returns the place in world units.
+    /// Set by who uses samples: a sample's place relative to the origin, world units.
     std::function<Vec3d(std::uint32_t)> placeOfSample;
 
   private:
@@ -85,8 +84,8 @@ Box3d brickTouchBox(const BrickKey& key, int brickCells);
 std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
                                          double spacingWorld);
 
-/// Number of bricks of one spacing that elements touch (and their keys, level 0, when `keys` isn't null); stops early, with a number above
-/// `limit`, when there are more. For single-level trees: needs no element lists.
+/// Number of bricks of depth frame.maxDepth that elements touch (and their keys, level 0, when `keys` isn't null and there are at most
+/// `limit`); -1 when the box of bricks is too large for a dense grid of marks. For single-level trees: no element lists.
 std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit, std::vector<BrickKey>* keys,
                            const Execution& execution);
 

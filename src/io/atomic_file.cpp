@@ -77,10 +77,11 @@ void checkTarget(const std::string& path, const fs::path& target) {
 
 std::string temporaryName(const fs::path& target, int attempt) {
     // The longest name a file system takes is mostly 255 bytes, and the prefix and suffix need some of them.
-    std::string stem = target.filename().string().substr(0, 200);
-    std::string name = "." + stem + "." + std::to_string(::getpid());
-    if (attempt > 0) name += "-" + std::to_string(attempt);
-    return (target.parent_path() / (name + ".tmp")).string();
+    std::string name = ".";
+    name.append(target.filename().string(), 0, 200);
+    name.append(".").append(std::to_string(::getpid()));
+    if (attempt > 0) name.append("-").append(std::to_string(attempt));
+    return (target.parent_path() / name.append(".tmp")).string();
 }
 
 }  // namespace

@@ -12,7 +12,6 @@ namespace {
 
 constexpr std::size_t kBatchTiles = 4096;
 
-int tileOffset(const Vec3i& q) { return (q.x * kTileSize + q.y) * kTileSize + q.z; }
 void setBit(std::array<std::uint64_t, 8>& words, int offset) {
     words[std::size_t(offset >> 6)] |= std::uint64_t(1) << (offset & 63);
 }

@@ -41,7 +41,7 @@ struct VdbWriteOptions {
 
 /// What was written.
 struct VdbWriteResult {
-    std::int64_t activeVoxels = 0;
+    std::int64_t activeVoxels = 0;      ///< of all grids
     std::int64_t fileBytes = 0;
     int flatLevel = 0;                  ///< flat: the level whose spacing the grid has (above 0 when maxFlatVoxels capped it)
     double unitScale = 1;

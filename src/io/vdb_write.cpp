@@ -42,11 +42,12 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
         const math::MapBase::Ptr map(new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
         return math::Transform::Ptr(new math::Transform(map));
     }
-    // Rows: where an index step along x, y, z leads in the file; the last row is the place of index (0, 0, 0).
-    const double s = spacing;
-    const math::Mat4d matrix = upAxis == UpAxis::y
-                                   ? math::Mat4d(s, 0, 0, 0, 0, 0, -s, 0, 0, s, 0, 0, origin.x, origin.z, -origin.y, 1)
-                                   : math::Mat4d(s, 0, 0, 0, 0, 0, s, 0, 0, -s, 0, 0, origin.x, -origin.z, origin.y, 1);
+    // Rows: where an index step along x, y, z leads in the file, then the place of index (0, 0, 0).
+    const auto rows = [&](double yz, double zy, double y, double z) {
+        return math::Mat4d(spacing, 0.0, 0.0, 0.0, 0.0, 0.0, yz, 0.0, 0.0, zy, 0.0, 0.0, origin.x, y, z, 1.0);
+    };
+    const math::Mat4d matrix = upAxis == UpAxis::y ? rows(-spacing, spacing, origin.z, -origin.y)
+                                                   : rows(spacing, -spacing, -origin.z, origin.y);
     return math::Transform::Ptr(new math::Transform(math::MapBase::Ptr(new math::AffineMap(matrix))));
 }
 

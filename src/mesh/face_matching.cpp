@@ -120,7 +120,7 @@ std::int64_t countDuplicates(const TetMesh& mesh, const FaceRecord* begin, const
     return duplicates;
 }
 
-/// Matches the faces of one bucket; sets the bits of boundary faces in `isBoundary`.
+/// Matches the faces of one bucket. Sets bit f of an element for a boundary face, bit 4 + f too when the face is lone.
 void matchBucket(const TetMesh& mesh, std::span<const std::uint8_t> flat, FaceRecord* begin, FaceRecord* end,
                  std::vector<std::uint8_t>& isBoundary, Counts& counts) {
     sortBucket(begin, end);
@@ -137,19 +137,21 @@ void matchBucket(const TetMesh& mesh, std::span<const std::uint8_t> flat, FaceRe
             user = i;
             ++solidUsers;
         }
-        if (solidUsers == 1)
-            std::atomic_ref(isBoundary[user->id / 4])
-                .fetch_or(std::uint8_t(1u << (user->id % 4)), std::memory_order_relaxed);
+        if (solidUsers == 1) {
+            const unsigned bits = (users == 1 ? 0x11u : 0x1u) << (user->id % 4);
+            std::atomic_ref(isBoundary[user->id / 4]).fetch_or(std::uint8_t(bits), std::memory_order_relaxed);
+        }
         run = runEnd;
     }
 }
 
-std::vector<BoundaryFace> collectBoundary(const TetMesh& mesh, const std::vector<std::uint8_t>& isBoundary) {
+std::vector<BoundaryFace> collectFaces(const TetMesh& mesh, const std::vector<std::uint8_t>& isBoundary,
+                                       std::size_t firstBit) {
     std::vector<BoundaryFace> faces;
     for (std::size_t e = 0; e < isBoundary.size(); ++e) {
         if (!isBoundary[e]) continue;
         for (std::size_t f = 0; f < 4; ++f) {
-            if (!(isBoundary[e] >> f & 1)) continue;
+            if (!(isBoundary[e] >> (firstBit + f) & 1)) continue;
             const auto& tet = mesh.tets[e];
             faces.push_back({std::int32_t(e),
                              {tet[kFaceNodes[f][0]], tet[kFaceNodes[f][1]], tet[kFaceNodes[f][2]]}});
@@ -176,7 +178,7 @@ FaceMatching matchFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat,
         crowded += counts.crowded;
         duplicate += counts.duplicate;
     });
-    return {collectBoundary(mesh, isBoundary), single, paired, crowded, duplicate};
+    return {collectFaces(mesh, isBoundary, 0), collectFaces(mesh, isBoundary, 4), single, paired, crowded, duplicate};
 }
 
 }  // namespace tessera

@@ -223,7 +223,7 @@ MeshQuality measureQuality(const TetMesh& mesh, const Execution& execution) {
     quality.innerFaces = matching.pairedFaces;
     const std::vector<std::int32_t> first = firstNodeAtPlace(mesh.points, execution);
     quality.nonConformingFaces =
-        matching.crowdedFaces + countInnerBoundary(mesh, matching.boundary, first, execution);
+        matching.crowdedFaces + countInnerBoundary(mesh, matching.lone, first, execution);
     for (std::size_t i = 0; i < first.size(); ++i) quality.coincidentNodes += first[i] != std::int32_t(i);
     return quality;
 }

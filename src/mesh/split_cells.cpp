@@ -18,6 +18,10 @@ using Tet = std::array<std::int32_t, 4>;
 
 constexpr std::int64_t kCellChunk = 1 << 12;
 
+/// A face is fanned from its smallest node unless the worst triangle of that fan is this much smaller than that of the best fan. (On a snappyHexMesh
+/// mesh of warped octree cells, 0.8 leaves no cell folded over, 0.2 and less leaves dozens.)
+constexpr double kGoodFan = 0.8;
+
 /// A face of a fixed kind of cell: local nodes counter-clockwise seen from outside.
 struct LocalFace {
     int count;
@@ -58,15 +62,16 @@ class Splitter {
         }
         triangles_.clear();
         if (kind == CellKind::polyhedron) {
-            splitPolyhedron(nodes);
-            return;
+            fanPolyhedron(nodes);
+        } else {
+            nodes_.assign(nodes.begin(), nodes.end());
+            for (const LocalFace& face : facesOf(kind)) {
+                polygon_.clear();
+                for (int i = 0; i < face.count; ++i) polygon_.push_back(nodes[std::size_t(face.nodes[std::size_t(i)])]);
+                fanPolygon();
+            }
         }
-        for (const LocalFace& face : facesOf(kind)) {
-            std::array<std::int32_t, 4> polygon{};
-            for (std::size_t i = 0; i < std::size_t(face.count); ++i) polygon[i] = nodes[std::size_t(face.nodes[i])];
-            fanPolygon({polygon.data(), std::size_t(face.count)});
-        }
-        emitCone(*std::min_element(nodes.begin(), nodes.end(), [&](auto a, auto b) { return before(a, b); }));
+        coneTriangles(kind == CellKind::polyhedron);
     }
 
   private:
@@ -79,17 +84,11 @@ class Splitter {
         return a < b;
     }
 
-    void fanPolygon(std::span<const std::int32_t> polygon) {
-        std::size_t start = 0;
-        for (std::size_t i = 1; i < polygon.size(); ++i)
-            if (before(polygon[i], polygon[start])) start = i;
-        for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-            const Triangle triangle{polygon[start], polygon[(start + i) % polygon.size()],
-                                    polygon[(start + i + 1) % polygon.size()]};
-            if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[0] != triangle[2])
-                triangles_.push_back(triangle);
-        }
-    }
+    std::size_t chooseFanStart() const;
+    void fanPolygon();
+    void fanPolyhedron(std::span<const std::int32_t> stream);
+    void orientFaces(std::vector<std::vector<std::int32_t>>& faces) const;
+    void coneTriangles(bool isPolyhedron);
 
     void emit(const Tet& tet) {
         for (std::size_t i = 0; i < 4; ++i)
@@ -109,11 +108,15 @@ class Splitter {
 
     const Vec3d& place(std::int32_t node) const { return points_[std::size_t(node)]; }
 
-    /// True when no tet of the cone from `apex` has the opposite sign of the cell.
-    bool coneKeepsSign(const Vec3d& apex, int cellSign) const {
-        return std::all_of(triangles_.begin(), triangles_.end(), [&](const Triangle& t) {
-            return volumeSign(place(t[0]), place(t[2]), place(t[1]), apex) * cellSign >= 0;
-        });
+    /// Smallest and largest sign among the tets of the cone from `apex`; `node` is its index, or -1.
+    std::pair<int, int> coneSigns(const Vec3d& apex, std::int32_t node) const {
+        std::pair<int, int> signs{1, -1};
+        for (const Triangle& t : triangles_) {
+            if (t[0] == node || t[1] == node || t[2] == node) continue;
+            const int sign = volumeSign(place(t[0]), place(t[2]), place(t[1]), apex);
+            signs = {std::min(signs.first, sign), std::max(signs.second, sign)};
+        }
+        return signs;
     }
 
     /// Six times the signed volume inside the triangles.
@@ -124,13 +127,99 @@ class Splitter {
         return sum;
     }
 
-    void splitPolyhedron(std::span<const std::int32_t> stream);
-    void orientFaces(std::vector<std::vector<std::int32_t>>& faces) const;
-
     const std::vector<Vec3d>& points_;
     std::int32_t cell_ = 0;
-    std::vector<Triangle> triangles_;
+    std::vector<std::int32_t> nodes_;      // of the cell
+    std::vector<std::int32_t> polygon_;    // one face
+    std::vector<Triangle> triangles_;      // of all faces, counter-clockwise seen from outside
 };
+
+/// The position in polygon_ that its triangles are fanned from. The share of a triangle is its area seen along the face's normal: negative when it is
+/// folded over, as at a concave corner, 0 at a hanging node. Both cells at the face come to the same choice bit for bit, because all is
+/// computed from the smallest node towards its smaller neighbour.
+std::size_t Splitter::chooseFanStart() const {
+    const std::size_t n = polygon_.size();
+    std::size_t smallest = 0;
+    for (std::size_t i = 1; i < n; ++i)
+        if (before(polygon_[i], polygon_[smallest])) smallest = i;
+    if (n == 3) return smallest;
+    const std::size_t step = before(polygon_[(smallest + 1) % n], polygon_[(smallest + n - 1) % n]) ? 1 : n - 1;
+    const auto corner = [&](std::size_t k) -> const Vec3d& { return place(polygon_[(smallest + k * step) % n]); };
+    const auto triangleNormal = [&](std::size_t start, std::size_t i) {
+        const Vec3d& a = corner(start);
+        return glm::cross(corner(start + i) - a, corner(start + i + 1) - a);
+    };
+    Vec3d normal(0);
+    for (std::size_t i = 1; i + 1 < n; ++i) normal += triangleNormal(0, i);
+    const auto worstShare = [&](std::size_t start) {
+        double worst = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 1; i + 1 < n; ++i) worst = std::min(worst, glm::dot(triangleNormal(start, i), normal));
+        return worst;
+    };
+    const double smallestShare = worstShare(0);
+    double bestShare = smallestShare;
+    std::size_t best = 0;
+    // Opposite nodes of a quad give the same fan.
+    for (std::size_t k = 1; k < (n == 4 ? 2 : n); ++k) {
+        const double share = worstShare(k);
+        if (share <= bestShare) continue;
+        best = k;
+        bestShare = share;
+    }
+    if (smallestShare > kGoodFan * bestShare) return smallest;
+    return (smallest + best * step) % n;
+}
+
+void Splitter::fanPolygon() {
+    const std::size_t n = polygon_.size();
+    if (n < 3) return;
+    const std::size_t start = chooseFanStart();
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+        const Triangle triangle{polygon_[start], polygon_[(start + i) % n], polygon_[(start + i + 1) % n]};
+        if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[0] != triangle[2])
+            triangles_.push_back(triangle);
+    }
+}
+
+/// Emits the cone over the faces' triangles from the first of these that does: a node, in coordinate order, that leaves every tet the sign of the
+/// cell; a node that gives flat tets besides; the centre; the smallest node as it is. A polyhedron prefers its centre to flat tets.
+void Splitter::coneTriangles(bool isPolyhedron) {
+    if (triangles_.empty()) return;
+    const auto smaller = [&](std::int32_t a, std::int32_t b) { return before(a, b); };
+    const std::int32_t smallest = *std::min_element(nodes_.begin(), nodes_.end(), smaller);
+    const auto smallestSigns = coneSigns(place(smallest), smallest);
+    if (smallestSigns.first * smallestSigns.second > 0) {
+        emitCone(smallest);
+        return;
+    }
+    std::sort(nodes_.begin(), nodes_.end(), smaller);
+    nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
+    Vec3d centre(0);
+    for (const std::int32_t node : nodes_) centre += place(node) - place(nodes_[0]);
+    centre = place(nodes_[0]) + centre / double(nodes_.size());
+    const double volume = volumeInside(centre);
+    const auto allKeepSign = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second < 0 : signs.first > 0; };
+    const auto noneInverted = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second <= 0 : signs.first >= 0; };
+
+    std::int32_t withFlat = -1;
+    for (const std::int32_t node : nodes_) {
+        const auto signs = coneSigns(place(node), node);
+        if (allKeepSign(signs)) {
+            emitCone(node);
+            return;
+        }
+        if (withFlat < 0 && noneInverted(signs)) withFlat = node;
+    }
+    const auto centreSigns = coneSigns(centre, -1);
+    const bool takeCentre = isPolyhedron ? allKeepSign(centreSigns) || withFlat < 0 : withFlat < 0 && noneInverted(centreSigns);
+    if (!takeCentre) {
+        emitCone(withFlat >= 0 ? withFlat : smallest);
+        return;
+    }
+    const auto added = std::int32_t(points_.size() + result.addedNodes.size());
+    result.addedNodes.push_back({centre, nodes_});
+    emitCone(added);
+}
 
 /// Makes neighbouring faces run through their common edge in opposite directions: not every writer does. The majority of
 /// the faces keep their direction.
@@ -171,35 +260,22 @@ void Splitter::orientFaces(std::vector<std::vector<std::int32_t>>& faces) const 
     }
 }
 
-void Splitter::splitPolyhedron(std::span<const std::int32_t> stream) {
+void Splitter::fanPolyhedron(std::span<const std::int32_t> stream) {
     std::vector<std::vector<std::int32_t>> faces;
-    std::vector<std::int32_t> nodes;
+    nodes_.clear();
     std::size_t at = 1;
     for (std::int32_t f = 0; f < stream[0]; ++f) {
         const auto count = std::size_t(stream[at]);
         const auto first = stream.begin() + std::ptrdiff_t(at) + 1;
         faces.emplace_back(first, first + std::ptrdiff_t(count));
-        nodes.insert(nodes.end(), faces.back().begin(), faces.back().end());
+        nodes_.insert(nodes_.end(), faces.back().begin(), faces.back().end());
         at += 1 + count;
     }
-    if (nodes.empty()) return;
     orientFaces(faces);
-    for (const auto& face : faces) fanPolygon(face);
-    std::sort(nodes.begin(), nodes.end(), [&](auto a, auto b) { return before(a, b); });
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-
-    Vec3d centre(0);
-    for (const std::int32_t node : nodes) centre += place(node) - place(nodes[0]);
-    centre = place(nodes[0]) + centre / double(nodes.size());
-    const int cellSign = volumeInside(centre) < 0 ? -1 : 1;
-    for (const std::int32_t node : nodes) {
-        if (!coneKeepsSign(place(node), cellSign)) continue;
-        emitCone(node);
-        return;
+    for (const auto& face : faces) {
+        polygon_ = face;
+        fanPolygon();
     }
-    const auto added = std::int32_t(points_.size() + result.addedNodes.size());
-    result.addedNodes.push_back({centre, nodes});
-    emitCone(added);
 }
 
 /// Appends the lists of one chunk; its added nodes come after those of the chunks before.

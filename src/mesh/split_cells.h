@@ -43,10 +43,11 @@ struct SplitCells {
     std::vector<AddedNode> addedNodes;      ///< node points.size() + i is addedNodes[i]
 };
 
-/// Splits cells into tetrahedra so that both sides of a shared face are cut alike: a face is fanned from its node that is smallest in
-/// lexicographic order of its coordinates (ties: of its index), which holds across blocks with separate points too. A cell is the cone from its own smallest
-/// node over the triangles of its other faces. A polyhedron takes another node, or its centre, when that inverts
-/// a tet. Tets keep the orientation of their cell. Tets with a repeated node are left out; other flat ones are kept.
+/// Splits cells into tetrahedra so that both sides of a shared face are cut alike, across blocks with separate points too: a face is fanned from its
+/// node that is smallest in lexicographic order of its coordinates (ties: of its index), unless its worst triangle is much better fanned from another
+/// (warped and concave faces, hanging nodes). A cell is the cone from its own smallest node over the triangles that don't hold it; where that
+/// inverts or flattens a tet, from another node or from its centre, which adds a node. Tets keep the orientation of their
+/// cell. Tets with a repeated node are left out; other flat ones are kept.
 /// @param cells every node index lies in [0, points.size()); every polyhedron's face stream is whole.
 SplitCells splitCells(const std::vector<Vec3d>& points, const CellList& cells, const Execution& execution);
 

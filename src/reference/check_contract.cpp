@@ -191,7 +191,7 @@ class Checker {
         checkValues(p, rightOwners(p));
     }
 
-    /// Candidates about as deep as the deepest.
+    /// Candidates about as deep as the deepest; those that contain the point come first.
     std::vector<Owner> rightOwners(const Vec3i& p) const {
         // Depths are known within 1e-8 voxel here; a resampler's own rounding is of that order too.
         constexpr double kSlack = 4e-8;
@@ -201,6 +201,7 @@ class Checker {
         std::vector<Owner> owners;
         for (const Candidate& c : candidates)
             if (c.depthVoxels >= deepest - bounds_.spillVoxels - kSlack) owners.emplace_back(oracle_, c, p, bounds_);
+        std::stable_partition(owners.begin(), owners.end(), [](const Owner& o) { return o.candidate().contains; });
         return owners;
     }
 
@@ -214,6 +215,7 @@ class Checker {
         double best = std::numeric_limits<double>::infinity();
         std::size_t bestChannel = 0;
         for (Owner& owner : owners) {
+            if (best < std::numeric_limits<double>::infinity() && !owner.candidate().contains) break;
             bool passes = true;
             double worst = 0;
             std::size_t worstChannel = 0;

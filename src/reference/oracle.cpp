@@ -47,44 +47,41 @@ mpq_class ratio(const mpz_class& num, const mpz_class& den) {
     return q;
 }
 
-/// Keeps the nearest of the places offered; the origin is the place it measures from.
-class Nearest {
-  public:
-    void offer(const mpq_class& squaredDistance, const ExactWeights& weights) {
-        if (found_ && squaredDistance >= best_.squaredDistance) return;
-        best_ = {weights, squaredDistance};
-        found_ = true;
-    }
-    const ExactNearest& best() const { return best_; }
-
-  private:
-    ExactNearest best_;
-    bool found_ = false;
+/// A place in an element as integer weights over their common denominator, with the square of its distance from the origin over the same.
+struct Place {
+    mpz_class squared, denominator = 1;
+    std::array<mpz_class, 4> weights;
 };
 
-void offerEdge(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, Nearest& nearest) {
-    const ExactVec edge = at[j] - at[i];
-    const mpz_class along = -dot(at[i], edge), length = dot(edge, edge);
-    if (along <= 0 || along >= length) return;
-    const mpq_class t = ratio(along, length);
-    ExactWeights weights;
-    weights[i] = 1 - t;
-    weights[j] = t;
-    nearest.offer(mpq_class(dot(at[i], at[i])) - t * along, weights);
+/// Keeps the nearer of two.
+void offer(Place&& place, Place& best) {
+    if (place.squared * best.denominator < best.squared * place.denominator) best = std::move(place);
 }
 
-void offerFace(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, std::size_t k, Nearest& nearest) {
+void offerEdge(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, Place& best) {
+    const ExactVec edge = at[j] - at[i];
+    const mpz_class along = -dot(at[i], edge);
+    if (along <= 0) return;
+    const mpz_class length = dot(edge, edge);
+    if (along >= length) return;
+    Place place{dot(at[i], at[i]) * length - along * along, length, {}};
+    place.weights[i] = length - along;
+    place.weights[j] = along;
+    offer(std::move(place), best);
+}
+
+void offerFace(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, std::size_t k, Place& best) {
     const ExactVec normal = cross(at[j] - at[i], at[k] - at[i]);
     // Areas of the three triangles that the origin's projection spans with the edges, times the length of the normal.
-    const mpz_class wi = dot(normal, cross(at[j], at[k])), wj = dot(normal, cross(at[k], at[i])),
-                    wk = dot(normal, cross(at[i], at[j]));
-    if (wi <= 0 || wj <= 0 || wk <= 0) return;
-    const mpz_class square = dot(normal, normal), height = dot(normal, at[i]);
-    ExactWeights weights;
-    weights[i] = ratio(wi, square);
-    weights[j] = ratio(wj, square);
-    weights[k] = ratio(wk, square);
-    nearest.offer(ratio(height * height, square), weights);
+    Place place;
+    place.weights[i] = dot(normal, cross(at[j], at[k]));
+    place.weights[j] = dot(normal, cross(at[k], at[i]));
+    place.weights[k] = dot(normal, cross(at[i], at[j]));
+    if (place.weights[i] <= 0 || place.weights[j] <= 0 || place.weights[k] <= 0) return;
+    const mpz_class height = dot(normal, at[i]);
+    place.squared = height * height;
+    place.denominator = dot(normal, normal);
+    offer(std::move(place), best);
 }
 
 }  // namespace
@@ -116,19 +113,20 @@ std::array<double, 4> Oracle::approximateBarycentrics(std::int64_t element, cons
 
 ExactNearest Oracle::nearest(std::int64_t element, const Vec3i& p) const {
     if (contains(element, p)) return {barycentrics(element, p), 0};
-    const Corners corners = cornersFrom(element, frame_.latticePoint(p));
-    Nearest nearest;
+    const auto at = cornersFrom(element, frame_.latticePoint(p)).at;
+    Place best{dot(at[0], at[0]), 1, {1, 0, 0, 0}};
     for (std::size_t i = 0; i < 4; ++i) {
-        ExactWeights weights;
-        weights[i] = 1;
-        nearest.offer(mpq_class(dot(corners.at[i], corners.at[i])), weights);
+        Place node{dot(at[i], at[i]), 1, {}};
+        node.weights[i] = 1;
+        offer(std::move(node), best);
         for (std::size_t j = i + 1; j < 4; ++j) {
-            offerEdge(corners.at, i, j, nearest);
-            for (std::size_t k = j + 1; k < 4; ++k) offerFace(corners.at, i, j, k, nearest);
+            offerEdge(at, i, j, best);
+            for (std::size_t k = j + 1; k < 4; ++k) offerFace(at, i, j, k, best);
         }
     }
-    ExactNearest result = nearest.best();
-    result.squaredDistance /= frame_.unit() * frame_.unit();
+    ExactNearest result;
+    for (std::size_t i = 0; i < 4; ++i) result.weights[i] = ratio(best.weights[i], best.denominator);
+    result.squaredDistance = ratio(best.squared, best.denominator * frame_.unit() * frame_.unit());
     return result;
 }
 

@@ -33,6 +33,9 @@ class FilteredElement {
         const double placeError = std::ldexp(std::max({size.x, size.y, size.z}), -50);
         const double pad = tolerance + 2 * placeError;
         box_ = Box3d{bounds.min - pad, bounds.max + pad};
+        nodes_ = at;
+        const Vec3d extent = box_.size();
+        placeSlack_ = 16 * (2 * placeError + std::ldexp(std::max({extent.x, extent.y, extent.z}), -50));
         setPlanes(at, placeError, tolerance);
     }
 
@@ -59,7 +62,46 @@ class FilteredElement {
         return isSound_ && depth > kClearVoxels ? Verdict::in : Verdict::doubtful;
     }
 
+    /// Bounds of the true distance. Any point of the element gives an upper one; the nodes' least extent along any direction
+    /// gives a lower one.
+    void boundDistance(const Vec3d& p, double& least, double& most) const {
+        std::array<Vec3d, 4> at;
+        for (std::size_t i = 0; i < 4; ++i) at[i] = nodes_[i] - p;
+        const Vec3d guess = nearestGuess(at);
+        const double length = glm::length(guess);
+        most = length + placeSlack_;
+        least = 0;
+        if (!(length > placeSlack_)) return;
+        const Vec3d direction = guess / length;
+        least = std::numeric_limits<double>::infinity();
+        for (const Vec3d& q : at) least = std::min(least, dot(direction, q));
+        least = std::max(0.0, least - placeSlack_);
+    }
+
   private:
+    /// The point of the element nearest to the origin, about: a good guess, not a bound.
+    static Vec3d nearestGuess(const std::array<Vec3d, 4>& at) {
+        Vec3d best = at[0];
+        const auto offer = [&](const Vec3d& q) {
+            if (dot(q, q) < dot(best, best)) best = q;
+        };
+        for (std::size_t i = 0; i < 4; ++i) {
+            offer(at[i]);
+            for (std::size_t j = i + 1; j < 4; ++j) {
+                const Vec3d edge = at[j] - at[i];
+                const double t = -dot(at[i], edge) / dot(edge, edge);
+                if (t > 0 && t < 1) offer(at[i] + t * edge);
+                for (std::size_t k = j + 1; k < 4; ++k) {
+                    const Vec3d normal = cross(edge, at[k] - at[i]);
+                    const double wi = dot(normal, cross(at[j], at[k])), wj = dot(normal, cross(at[k], at[i])),
+                                 wk = dot(normal, cross(at[i], at[j]));
+                    if (wi > 0 && wj > 0 && wk > 0) offer((wi * at[i] + wj * at[j] + wk * at[k]) / (wi + wj + wk));
+                }
+            }
+        }
+        return best;
+    }
+
     struct Plane {
         Vec3d inward{0};   ///< length: twice the face's area
         Vec3d node{0};
@@ -92,18 +134,29 @@ class FilteredElement {
     }
 
     Box3d box_;
+    std::array<Vec3d, 4> nodes_;
+    double placeSlack_ = 0;
     std::array<Plane, 4> planes_;
     bool isSound_ = false;
 };
 
 /// Decides one pair in rational arithmetic; false when the point is further away than the tolerance.
-bool decideExactly(const Oracle& oracle, std::int64_t element, const Vec3i& p, double tolerance, Candidate& candidate) {
-    candidate = {std::int32_t(element), oracle.contains(element, p), 0, 0};
+bool decideExactly(const Oracle& oracle, const FilteredElement& filter, const Vec3i& p, const ReferenceOptions& options,
+                   Candidate& candidate) {
+    const double tolerance = options.toleranceVoxels;
+    const std::int64_t element = candidate.element;
+    double least = 0, most = std::numeric_limits<double>::infinity();
+    if (!options.isUnfiltered) filter.boundDistance(Vec3d(p), least, most);
+    if (least > tolerance) return false;
+    candidate.contains = oracle.contains(element, p);
     if (!candidate.contains) {
-        const mpq_class square = oracle.nearest(element, p).squaredDistance;
-        const mpq_class bound(tolerance);
-        if (square > bound * bound) return false;
-        candidate.distanceVoxels = std::sqrt(approximateRatio(square.get_num(), square.get_den()));
+        if (most > tolerance || most - least > 0.1 * most) {
+            const mpq_class square = oracle.nearest(element, p).squaredDistance, bound(tolerance);
+            if (square > bound * bound) return false;
+            candidate.distanceVoxels = std::sqrt(approximateRatio(square.get_num(), square.get_den()));
+        } else {
+            candidate.distanceVoxels = 0.5 * (least + most);
+        }
     }
     candidate.depthVoxels = oracle.depthVoxels(element, p);
     return true;
@@ -131,7 +184,7 @@ std::int64_t findPoints(const Oracle& oracle, std::int64_t element, const IndexB
                 if (verdict == FilteredElement::Verdict::out) continue;
                 if (verdict == FilteredElement::Verdict::doubtful) {
                     ++exactPairs;
-                    if (!decideExactly(oracle, element, p, options.toleranceVoxels, candidate)) continue;
+                    if (!decideExactly(oracle, filter, p, options, candidate)) continue;
                 }
                 found.push_back({offsetIn(box, p), candidate});
             }

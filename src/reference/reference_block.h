@@ -14,7 +14,7 @@ struct Candidate {
     std::int32_t element = -1;
     bool contains = false;       ///< in the closed element, exactly
     double depthVoxels = 0;      ///< signed distance to the nearest face plane; within 1e-8 voxel
-    double distanceVoxels = 0;   ///< true distance to the element; 0 when contained, else within 2^-48 relatively
+    double distanceVoxels = 0;   ///< true distance to the element; 0 when contained, else within 10 %
 };
 
 /// What is true of every point of a box of lattice points, by exact arithmetic.

@@ -36,6 +36,9 @@ class BoundResampler {
   public:
     virtual ~BoundResampler() = default;
 
+    /// The code path in use, one of Resampler::targets().
+    virtual std::string_view target() const { return "default"; }
+
     /// Samples the boxes of one lattice. Boxes may overlap and lie anywhere. The values and coverage of a lattice point depend on the mesh and
     /// that point only: not on the boxes, threads or processor.
     /// Throws InputError for a lattice that can't be used (spacing not positive and finite, indices beyond 2^30).

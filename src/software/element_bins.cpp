@@ -1,11 +1,14 @@
 #include "software/element_bins.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace tessera {
 
 namespace {
+
+constexpr std::int64_t kAhead = 24;
 
 struct Pair {
     std::int32_t region;
@@ -26,8 +29,9 @@ class RegionGrid {
         std::size_t cells = 1;
         for (int a = 0; a < 3; ++a) {
             const int extent = bounds_.max[a] - bounds_.min[a];
-            edge_[a] = std::max(smallest[a], (extent + kMostCells - 1) / kMostCells);
-            cells_[a] = (extent + edge_[a] - 1) / edge_[a];
+            const int edge = std::max(smallest[a], (extent + kMostCells - 1) / kMostCells);
+            shift_[a] = std::bit_width(unsigned(edge) - 1);   // a power of two: this runs for every element
+            cells_[a] = ((extent - 1) >> shift_[a]) + 1;
             cells *= std::size_t(cells_[a]);
         }
         first_.assign(cells + 1, 0);
@@ -66,7 +70,7 @@ class RegionGrid {
     static constexpr int kMostCells = 128;
 
     Vec3i cellOf(const Vec3i& p) const {
-        return {(p.x - bounds_.min.x) / edge_.x, (p.y - bounds_.min.y) / edge_.y, (p.z - bounds_.min.z) / edge_.z};
+        return {(p.x - bounds_.min.x) >> shift_.x, (p.y - bounds_.min.y) >> shift_.y, (p.z - bounds_.min.z) >> shift_.z};
     }
     std::size_t index(const Vec3i& cell) const {
         return (std::size_t(cell.z) * std::size_t(cells_.y) + std::size_t(cell.y)) * std::size_t(cells_.x) +
@@ -84,9 +88,19 @@ class RegionGrid {
 
     std::span<const IndexBox> regions_;
     IndexBox bounds_;
-    Vec3i edge_{1}, cells_{1};
+    Vec3i shift_{0}, cells_{1};
     std::vector<std::int32_t> first_, list_;
 };
+
+// Without SSE4 the library's floor and ceil are calls; values here fit an int.
+int ceilToInt(float x) {
+    const int whole = int(x);
+    return whole + (float(whole) < x);
+}
+int floorToInt(float x) {
+    const int whole = int(x);
+    return whole - (float(whole) > x);
+}
 
 // Bounds of an element in lattice points from the rounded node places, widened by their rounding. False when they hold none in `bounds`.
 bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, const IndexBox& bounds, Vec3i& low,
@@ -103,14 +117,13 @@ bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& te
         most[a] = maximum + (std::fabs(maximum) * 0x1p-22f + 0x1p-26f);
     }
     for (int a = 0; a < 3; ++a) {
-        const float from = std::max(least[a], float(bounds.min[a]) - 1.0f - std::fabs(float(bounds.min[a])) * 0x1p-22f);
-        const float to = std::min(most[a], float(bounds.max[a]) + 1.0f + std::fabs(float(bounds.max[a])) * 0x1p-22f);
-        if (!(from <= to)) return false;
-        low[a] = std::max(int(std::ceil(from)), bounds.min[a]);
-        high[a] = std::min(int(std::floor(to)), bounds.max[a] - 1);
-        if (low[a] > high[a]) return false;
+        // Clamped to the int range's better half first: nodes may lie anywhere.
+        const float from = std::clamp(least[a], -0x1p30f - 2048.0f, 0x1p30f + 2048.0f);
+        const float to = std::clamp(most[a], -0x1p30f - 2048.0f, 0x1p30f + 2048.0f);
+        low[a] = std::max(ceilToInt(from), bounds.min[a]);
+        high[a] = std::min(floorToInt(to), bounds.max[a] - 1);
     }
-    return true;
+    return low.x <= high.x && low.y <= high.y && low.z <= high.z;
 }
 
 }  // namespace
@@ -132,6 +145,9 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
         count.assign(regions.size(), 0);
         found.reserve(std::size_t(end - begin));
         for (std::int64_t e = begin; e < end; ++e) {
+            if (e + kAhead < end)   // elements come in no order that caches could guess
+                for (const std::int32_t node : mesh.tets[std::size_t(e + kAhead)])
+                    __builtin_prefetch(frame.rough[std::size_t(node)].data());
             Vec3i low, high;
             if (!latticeBounds(frame, mesh.tets[std::size_t(e)], grid.bounds(), low, high)) continue;
             grid.forEachRegion(low, high, [&](std::int32_t region) {

@@ -48,8 +48,9 @@ struct ExactElement {
     Real dilation;   // bound on the rounding of a barycentric coordinate
 };
 
+// Gives the determinant, six times the volume in voxels; gradients only when it isn't zero.
 template <class Real>
-bool setUpGradients(ExactElement<Real>& e) {
+Real setUpGradients(ExactElement<Real>& e) {
     Real edge[3][3], normal[3][3];
     for (int k = 0; k < 3; ++k)
         for (int a = 0; a < 3; ++a) edge[k][a] = e.node[k + 1][a] - e.node[0][a];
@@ -60,7 +61,7 @@ bool setUpGradients(ExactElement<Real>& e) {
             normal[k][a] = p[(a + 1) % 3] * q[(a + 2) % 3] - p[(a + 2) % 3] * q[(a + 1) % 3];
     }
     const Real det = edge[0][0] * normal[0][0] + edge[0][1] * normal[0][1] + edge[0][2] * normal[0][2];
-    if (det == 0) return false;
+    if (det == 0) return det;
     e.constant[0] = 1;
     for (int a = 0; a < 3; ++a) e.gradient[0][a] = 0;
     for (int k = 1; k < 4; ++k) {
@@ -72,7 +73,7 @@ bool setUpGradients(ExactElement<Real>& e) {
         }
         e.constant[0] -= e.constant[k];
     }
-    return true;
+    return det;
 }
 
 template <class Real>
@@ -87,18 +88,19 @@ void setUpBox(ExactElement<Real>& e) {
 }
 
 // False when 113 bits can't promise the limits of scan.h.
-bool setUp(const ScanInput& input, std::int32_t element, const double (&base)[3], ExactElement<Quad>& e) {
+bool setUp(const ScanInput& input, std::int32_t element, ExactElement<Quad>& e) {
     const auto& tet = input.mesh.tets[std::size_t(element)];
     double farthest = 1;
     for (std::size_t k = 0; k < 4; ++k) {
         const auto index = quadIndexFromWorld(input.frame.lattice, input.mesh.points[std::size_t(tet[k])]);
         for (std::size_t a = 0; a < 3; ++a) {
             farthest = std::max(farthest, std::fabs(double(index[a])));
-            e.node[k][a] = index[a] - Quad(base[a]);
+            e.node[k][a] = index[a] - Quad(e.base[a]);
         }
     }
     setUpBox(e);
-    if (!setUpGradients(e)) return false;
+    const Quad det = setUpGradients(e);
+    if (det == 0) return false;
     const Quad unit = 0x1p-112;
     Quad steepest = 0, boxVolume = 1, size = 0, longest = 0;
     for (int k = 0; k < 4; ++k)
@@ -109,24 +111,15 @@ bool setUp(const ScanInput& input, std::int32_t element, const double (&base)[3]
         size += extent;
         longest = std::max(longest, extent);
     }
-    // |det| from the gradient: gradient 1 = normal / det, so the box volume over it bounds the relative error of det.
-    Quad det = 0;
-    {
-        Quad edge[3][3];
-        for (int k = 0; k < 3; ++k)
-            for (int a = 0; a < 3; ++a) edge[k][a] = e.node[k + 1][a] - e.node[0][a];
-        for (int a = 0; a < 3; ++a)
-            det += edge[0][a] * (edge[1][(a + 1) % 3] * edge[2][(a + 2) % 3] - edge[1][(a + 2) % 3] * edge[2][(a + 1) % 3]);
-    }
     e.dilation = unit * (256 * boxVolume / absolute(det) + 128 * steepest * (longest + Quad(farthest) + 2));
     return e.dilation <= Quad(kLargestSlack) && e.dilation * size <= Quad(kLargestSlackTimesSize);
 }
 
-void setUp(const ScanInput& input, std::int32_t element, const double (&base)[3], ExactElement<mpq_class>& e) {
+void setUp(const ScanInput& input, std::int32_t element, ExactElement<mpq_class>& e) {
     const auto& tet = input.mesh.tets[std::size_t(element)];
     for (std::size_t k = 0; k < 4; ++k) {
         const auto index = exactIndexFromWorld(input.frame.lattice, input.mesh.points[std::size_t(tet[k])]);
-        for (std::size_t a = 0; a < 3; ++a) e.node[k][a] = index[a] - mpq_class(base[a]);
+        for (std::size_t a = 0; a < 3; ++a) e.node[k][a] = index[a] - mpq_class(e.base[a]);
     }
     setUpBox(e);
     setUpGradients(e);   // the caller made sure that the exact volume isn't zero
@@ -162,6 +155,47 @@ struct ExactChannel {
                                            difference[2] * barycentric[3]));
         return std::clamp(float(std::clamp(value, double(low), double(high))), low, high);
     }
+};
+
+// Rejects most scanlines of a thin element in double precision: those that surely pass between two lattice points.
+class RoughScanlines {
+  public:
+    template <class Real>
+    RoughScanlines(const ExactElement<Real>& e, int s, int t, int r) {
+        low_ = toDouble(e.low[s]);
+        high_ = toDouble(e.high[s]);
+        for (int k = 0; k < 4; ++k) {
+            const double slope = toDouble(e.gradient[k][s]);
+            // A face along the scanline, or one whose solution would overflow, rejects nothing here.
+            const double a = toDouble(Real(-(e.dilation + e.constant[k]))) / slope;
+            const double b = -toDouble(e.gradient[k][t]) / slope, c = -toDouble(e.gradient[k][r]) / slope;
+            if (!(std::fabs(a) + std::fabs(b) + std::fabs(c) < 1e200)) continue;
+            plane_[count_++] = {a, b, c, slope > 0};
+        }
+    }
+    bool mayHoldPoint(double t, double r) const {
+        double low = low_, high = high_;
+        for (int i = 0; i < count_; ++i) {
+            const Plane& p = plane_[i];
+            const double bound = (p.a + p.b * t) + p.c * r;
+            const double error = 0x1p-48 * (std::fabs(p.a) + std::fabs(p.b * t) + std::fabs(p.c * r));
+            if (p.lower)
+                low = std::max(low, bound - error);
+            else
+                high = std::min(high, bound + error);
+        }
+        const double slack = 2 * kBoxSlack + 0x1p-48 * (std::fabs(low) + std::fabs(high));
+        return std::ceil(low - slack) <= std::floor(high + slack);
+    }
+
+  private:
+    struct Plane {
+        double a, b, c;
+        bool lower;
+    };
+    double low_, high_;
+    Plane plane_[4];
+    int count_ = 0;
 };
 
 // Ends of the scanline at (t, r) along axis `s`, relative to the first voxel.
@@ -205,10 +239,12 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
     std::vector<ExactChannel<Real>> channels;
     for (const ScanChannel& source : input.channels) channels.emplace_back(source, tet, element);
     std::optional<ElementDepth> depth;
+    const RoughScanlines rough(e, s, t, r);
 
     for (double atR = from[r]; atR <= to[r]; ++atR) {
         for (double atT = from[t]; atT <= to[t]; ++atT) {
             ++counts.scanlines;
+            if (!rough.mayHoldPoint(atT, atR)) continue;
             double begin = 0, end = 0;
             if (!scanlineEnds(e, s, t, r, atT, atR, begin, end)) continue;
             for (double atS = std::max(begin, from[s]); atS <= std::min(end, to[s]); ++atS) {
@@ -234,6 +270,14 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
     }
 }
 
+void firstVoxel(const ScanInput& input, std::int32_t element, double (&base)[3]) {
+    const auto& tet = input.mesh.tets[std::size_t(element)];
+    for (int a = 0; a < 3; ++a) {
+        base[a] = input.frame.nodes[std::size_t(tet[0])].whole[a];
+        for (std::size_t k = 1; k < 4; ++k) base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
+    }
+}
+
 bool hasRepeatedNode(const TetMesh& mesh, const std::array<std::int32_t, 4>& tet) {
     for (std::size_t i = 0; i < 4; ++i)
         for (std::size_t j = i + 1; j < 4; ++j)
@@ -250,21 +294,45 @@ void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::i
     const auto corner = [&](std::size_t k) { return mesh.points[std::size_t(tet[k])]; };
     if (volumeSign(corner(0), corner(1), corner(2), corner(3)) == 0) return;
     ++counts.exactElements;
-    double base[3];
-    for (int a = 0; a < 3; ++a) {
-        base[a] = input.frame.nodes[std::size_t(tet[0])].whole[a];
-        for (std::size_t k = 1; k < 4; ++k) base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
-    }
     ExactElement<Quad> quad;
-    std::copy_n(base, 3, quad.base);
-    if (setUp(input, element, base, quad)) {
+    firstVoxel(input, element, quad.base);
+    if (setUp(input, element, quad)) {
         walk(input, output, element, quad, counts);
         return;
     }
     ExactElement<mpq_class> exact;
-    std::copy_n(base, 3, exact.base);
-    setUp(input, element, base, exact);
+    firstVoxel(input, element, exact.base);
+    setUp(input, element, exact);
     walk(input, output, element, exact, counts);
+}
+
+struct ExactScanlines::Impl {
+    int axis;
+    std::optional<ExactElement<Quad>> quad;
+    std::optional<ExactElement<mpq_class>> exact;
+};
+
+ExactScanlines::ExactScanlines(const ScanInput& input, std::int32_t element, int axis) : impl_(std::make_unique<Impl>()) {
+    impl_->axis = axis;
+    impl_->quad.emplace();
+    firstVoxel(input, element, impl_->quad->base);
+    if (setUp(input, element, *impl_->quad)) return;
+    impl_->quad.reset();
+    impl_->exact.emplace();
+    firstVoxel(input, element, impl_->exact->base);
+    setUp(input, element, *impl_->exact);
+}
+
+ExactScanlines::~ExactScanlines() = default;
+
+void ExactScanlines::ends(double atT, double atR, double& begin, double& end) const {
+    const int s = impl_->axis, t = s == 0 ? 1 : 0, r = s == 2 ? 1 : 2;
+    const bool some = impl_->quad ? scanlineEnds(*impl_->quad, s, t, r, atT, atR, begin, end)
+                                  : scanlineEnds(*impl_->exact, s, t, r, atT, atR, begin, end);
+    if (!some) {
+        begin = 1;
+        end = 0;
+    }
 }
 
 bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ElementDepth& depth,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -38,7 +39,7 @@ inline constexpr std::int32_t kNoOwner = -1;
 struct ScanOutput {
     IndexBox region;
     IndexBox blockBox;
-    std::int64_t stride[3];            ///< of x, y and z
+    std::int64_t stride[3];            ///< of x, y and z: 1, nx, nx ny
     std::span<float* const> values;    ///< one array a channel
     std::int32_t* owner;               ///< kNoOwner, or the covering element, perhaps with kDepthKnown
     double* depth;                     ///< written when a point becomes contested
@@ -46,6 +47,9 @@ struct ScanOutput {
     std::int64_t offset(const Vec3i& p) const {
         const Vec3i q = p - blockBox.min;
         return q.x * stride[0] + q.y * stride[1] + q.z * stride[2];
+    }
+    Vec3i pointAt(std::int64_t offset) const {
+        return blockBox.min + Vec3i{int(offset % stride[1]), int(offset % stride[2] / stride[1]), int(offset / stride[2])};
     }
 };
 
@@ -62,6 +66,21 @@ bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t
 /// Samples one element in 113-bit arithmetic or, where that isn't enough, in rationals.
 void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts);
 
+/// The ends of single scanlines of one element, decided in 113-bit arithmetic or rationals: for those that double precision can't decide.
+class ExactScanlines {
+  public:
+    /// @param axis the axis scanned, 0 to 2.
+    ExactScanlines(const ScanInput& input, std::int32_t element, int axis);
+    ~ExactScanlines();
+    /// First and last voxel of the scanline relative to the element's first voxel; begin > end when it has none. @param t, r places along the
+    /// other two axes in ascending order, relative to the first voxel.
+    void ends(double t, double r, double& begin, double& end) const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
 using ScanFunction = void (*)(const ScanInput&, const ScanOutput&, std::span<const std::int32_t> elements, ScanCounts&);
 
 /// A compiled version of the scan for one instruction set.
@@ -72,8 +91,9 @@ struct ScanTarget {
 /// Those that this processor can run, the fastest first. All give the same bits.
 const std::vector<ScanTarget>& scanTargets();
 
-/// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding: these limits on T keep a covered point
-/// within 2^-26 voxel of the element and its value within 1/16 ulp (derivation in docs/algorithms.md).
+/// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding. T below the first limit keeps a
+/// value within 1/16 ulp; T times the element's size below the second keeps a covered point within 2^-26 voxel of the
+/// element. Derivation in docs/algorithms.md.
 inline constexpr double kLargestSlack = 0x1p-28;
 inline constexpr double kLargestSlackTimesSize = 0x1p-29;
 /// Widening of an element's bounding box, in voxels; above the rounding of node places.

@@ -24,11 +24,20 @@
 namespace tessera::scan_kernel {
 
 inline constexpr int kBatch = 8;
+/// Runs of at least this many voxels along x are filled a vector at a time.
+inline constexpr int kLongRun = 8;
 inline constexpr double kUnit = 0x1p-53;
 /// An axis other than x is scanned when the element is this many times longer along it: rows along x are contiguous in memory.
 inline constexpr double kAxisGain = 4.0;
+/// A scanline's first or last voxel may lie this far outside the element, in voxels.
+inline constexpr double kEndTolerance = 0x1p-26;
 /// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or everywhere.
 inline constexpr double kParallel = 1e200;
+
+/// How far double precision reaches for an element.
+inline constexpr double kThin = 0;       // values can't be trusted
+inline constexpr double kDoubtful = 1;   // values can, but a scanline whose end comes close to a voxel needs a second look
+inline constexpr double kEasy = 2;
 
 /// Setup of eight elements, lane by lane.
 struct alignas(64) Batch {
@@ -39,7 +48,8 @@ struct alignas(64) Batch {
     double axis[kBatch];                              // scan axis
     double minS[kBatch], maxS[kBatch];                // widened bounds
     double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];   // whole numbers
-    double easy[kBatch];
+    double grade[kBatch];                             // kThin, kDoubtful or kEasy
+    double shrink[4][kBatch];                         // added to planeA: the face moved inwards by as much as it was moved outwards
     double gradient[4][3][kBatch], constant[4][kBatch];   // barycentrics: constant + gradient . (s, t, r)
 };
 
@@ -49,6 +59,10 @@ struct alignas(64) BatchChannel {
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
     bool finite[kBatch];
+    bool tiny[kBatch];   // so small that a step from voxel to voxel would lose bits in float
+    // Of the element and group of scanlines at work:
+    alignas(64) double first[kBatch];   // value at the first voxel of each scanline's run
+    float step;                         // difference from voxel to voxel
 };
 
 /// Rows of a group of eight scanlines for a strip of `count` rows along t: lane -> (t, r) offset.
@@ -76,7 +90,6 @@ inline const RowTable& rowTable() {
 struct Scratch {
     Batch batch;
     std::vector<BatchChannel> channels;
-    std::vector<float> first, step;   // channels x kBatch, channels
 };
 
 }  // namespace tessera::scan_kernel
@@ -88,6 +101,7 @@ namespace tessera::scan_kernel::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kBatch>;
 using V = hn::VFromD<D>;
+using M = decltype(hn::Eq(V(), V()));
 
 HWY_INLINE V abs3(V a, V b, V c) { return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c)); }
 HWY_INLINE V dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
@@ -169,14 +183,17 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     const V fromPlace = hn::Mul(hn::Mul(hn::Set(d, 128.0), steepest), hn::Add(longest, hn::Set(d, 2.0)));
     const V dilation = hn::Mul(hn::Set(d, kUnit), hn::Add(fromDet, fromPlace));
     const V spread = hn::Mul(dilation, hn::Add(hn::Add(size0, size1), size2));
-    const auto easy = hn::And(hn::Le(dilation, hn::Set(d, kLargestSlack)), hn::Le(spread, hn::Set(d, kLargestSlackTimesSize)));
-    hn::Store(hn::IfThenElseZero(easy, one), d, &batch.easy[lane]);
+    const auto valued = hn::Le(dilation, hn::Set(d, kLargestSlack));
+    const auto easy = hn::And(valued, hn::Le(spread, hn::Set(d, kLargestSlackTimesSize)));
+    hn::Store(hn::IfThenElse(easy, hn::Set(d, kEasy), hn::IfThenElseZero(valued, hn::Set(d, kDoubtful))), d,
+              &batch.grade[lane]);
 
     const V tiny = hn::Set(d, 1.0 / kParallel);
     for (int k = 0; k < 4; ++k) {
         const V s = g[k][0];
         const V reciprocal = hn::IfThenElse(hn::Lt(hn::Abs(s), tiny), hn::Set(d, kParallel), hn::Div(one, s));
         hn::Store(hn::Neg(hn::Mul(hn::Add(dilation, c[k]), reciprocal)), d, &batch.planeA[k][lane]);
+        hn::Store(hn::Mul(hn::Add(dilation, dilation), reciprocal), d, &batch.shrink[k][lane]);
         hn::Store(hn::Neg(hn::Mul(g[k][1], reciprocal)), d, &batch.planeB[k][lane]);
         hn::Store(hn::Neg(hn::Mul(g[k][2], reciprocal)), d, &batch.planeC[k][lane]);
         hn::Store(hn::IfThenElseZero(hn::Gt(reciprocal, hn::Zero(d)), one), d, &batch.lower[k][lane]);
@@ -234,6 +251,7 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
         channel.low[lane] = low;
         channel.high[lane] = high;
         channel.finite[lane] = finite;
+        channel.tiny[lane] = std::max(std::fabs(low), std::fabs(high)) < 0x1p-96f;
         if (!finite)
             for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
     }
@@ -252,6 +270,12 @@ struct Walk {
     std::int64_t origin;   // offset of the element's first voxel in the block (may lie outside)
     int axis;
     std::optional<ElementDepth> depth;
+    std::optional<ExactScanlines> exact;
+};
+
+// A group of scanlines: where each one's run starts in the block, how long it is there, and how many of its voxels lie before the region.
+struct alignas(64) Rows {
+    double offset[kBatch], length[kBatch], skipped[kBatch];
 };
 
 HWY_INLINE float limited(float value, float low, float high) {
@@ -259,64 +283,114 @@ HWY_INLINE float limited(float value, float low, float high) {
     return value > high ? high : value;
 }
 
-Vec3i pointOf(const Walk& walk, std::int64_t s, std::int64_t t, std::int64_t r) {
-    const Batch& batch = walk.scratch.batch;
-    const std::int64_t local[3] = {walk.axis == 0 ? s : t, walk.axis == 1 ? s : (walk.axis == 0 ? t : r),
-                                   walk.axis == 2 ? s : r};
-    Vec3i p;
-    for (int a = 0; a < 3; ++a) p[a] = int(std::int64_t(batch.base[a][walk.lane]) + local[a]);
-    return p;
+float valueAt(const BatchChannel& channel, int lane, int row, int step) {
+    if (!channel.finite[lane]) return std::numeric_limits<float>::quiet_NaN();
+    const float value = channel.tiny[lane] ? float(channel.first[row] + double(step) * channel.gradientS[lane])
+                                           : float(channel.first[row]) + float(step) * channel.step;
+    return limited(value, channel.low[lane], channel.high[lane]);
 }
 
 // Points of the run that another element covers already: the deeper one owns them.
-HWY_NOINLINE void writeContestedRun(Walk& walk, std::int64_t offset, std::int64_t s, std::int64_t t, std::int64_t r,
-                                    std::int64_t length, std::int64_t skipped, int row) {
+HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
     const Scratch& scratch = walk.scratch;
-    for (std::int64_t k = 0; k < length; ++k, offset += walk.strideS) {
+    std::int64_t offset = std::int64_t(rows.offset[row]);
+    for (int k = 0; k < int(rows.length[row]); ++k, offset += walk.strideS) {
         std::int32_t& owner = walk.output.owner[offset];
         if (owner == kNoOwner) {
             owner = walk.element;
         } else {
             ++walk.counts.contested;
             if (!walk.depth) walk.depth.emplace(walk.input.mesh, walk.input.frame, walk.element);
-            if (!contestPoint(walk.input, walk.output, walk.element, *walk.depth, pointOf(walk, s + k, t, r))) continue;
+            if (!contestPoint(walk.input, walk.output, walk.element, *walk.depth, walk.output.pointAt(offset))) continue;
         }
-        for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
-            const BatchChannel& channel = scratch.channels[c];
-            const float value = scratch.first[c * kBatch + std::size_t(row)] + float(skipped + k) * scratch.step[c];
-            walk.output.values[c][offset] =
-                channel.finite[walk.lane] ? limited(value, channel.low[walk.lane], channel.high[walk.lane])
-                                          : std::numeric_limits<float>::quiet_NaN();
+        const int step = int(rows.skipped[row]) + k;
+        for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
+            walk.output.values[c][offset] = valueAt(scratch.channels[c], walk.lane, row, step);
         }
     }
 }
 
-// One run of voxels, counted from the run's own first voxel so that values don't depend on the region.
-HWY_INLINE void writeRun(Walk& walk, double start, double first, double last, double tLocal, double rLocal, int row) {
-    const std::int64_t s = std::int64_t(first), t = std::int64_t(tLocal), r = std::int64_t(rLocal);
-    const std::int64_t length = std::int64_t(last) - s + 1, skipped = s - std::int64_t(start);
-    const std::int64_t offset = walk.origin + s * walk.strideS + t * walk.strideT + r * walk.strideR;
+// Values of one run of voxels that nothing covered before, counted from the run's own first voxel so that they don't depend on the region.
+HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped, float value, float step, float low,
+                        float high) {
+    int k = 0;
+    if (stride == 1 && length >= kLongRun) {
+        const hn::ScalableTag<float> df;
+        const int lanes = int(hn::Lanes(df));
+        const auto lowest = hn::Set(df, low), highest = hn::Set(df, high), slope = hn::Set(df, step), first = hn::Set(df, value);
+        for (; k + lanes <= length; k += lanes) {
+            auto v = hn::Add(first, hn::Mul(hn::Iota(df, float(skipped + k)), slope));
+            v = hn::IfThenElse(hn::Lt(v, lowest), lowest, v);
+            v = hn::IfThenElse(hn::Gt(v, highest), highest, v);
+            hn::StoreU(v, df, out + k);
+        }
+    }
+    for (; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
+}
+
+HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
+    const int length = int(rows.length[row]), skipped = int(rows.skipped[row]);
+    const std::int64_t offset = std::int64_t(rows.offset[row]);
     std::int32_t* const owner = walk.output.owner + offset;
     const std::int64_t stride = walk.strideS;
     std::int32_t free = kNoOwner;
-    for (std::int64_t k = 0; k < length; ++k) free &= owner[k * stride];
+    for (int k = 0; k < length; ++k) free &= owner[k * stride];
     if (free != kNoOwner) {
-        writeContestedRun(walk, offset, s, t, r, length, skipped, row);
+        writeContestedRun(walk, rows, row);
         return;
     }
-    for (std::int64_t k = 0; k < length; ++k) owner[k * stride] = walk.element;
+    for (int k = 0; k < length; ++k) owner[k * stride] = walk.element;
     const Scratch& scratch = walk.scratch;
-    for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
+    for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
-        const float value = scratch.first[c * kBatch + std::size_t(row)], step = scratch.step[c];
-        const float low = channel.low[walk.lane], high = channel.high[walk.lane];
         float* const out = walk.output.values[c] + offset;
-        if (channel.finite[walk.lane]) {
-            for (std::int64_t k = 0; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
+        if (channel.finite[walk.lane] && !channel.tiny[walk.lane]) {
+            fillRun(out, stride, length, skipped, float(channel.first[row]), channel.step,
+                    channel.low[walk.lane], channel.high[walk.lane]);
         } else {
-            for (std::int64_t k = 0; k < length; ++k) out[k * stride] = std::numeric_limits<float>::quiet_NaN();
+            for (int k = 0; k < length; ++k) out[k * stride] = valueAt(channel, walk.lane, row, skipped + k);
         }
     }
+}
+
+// True for scanlines whose ends differ too much when the faces are moved inwards instead of outwards.
+template <int Lower>
+HWY_INLINE M doubtfulEnds(const Batch& batch, int lane, const int (&order)[4], V t, V r, V minS, V maxS, V begin,
+                                      V end) {
+    const D d;
+    V low = minS, high = maxS;
+    for (int i = 0; i < 4; ++i) {
+        const int face = order[i];
+        const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane] + batch.shrink[face][lane]),
+                                        hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
+                                hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
+        if (i < Lower)
+            low = hn::Max(low, bound);
+        else
+            high = hn::Min(high, bound);
+    }
+    // Where the scanline surely meets the element, an end within the tolerance of it is as good as exact.
+    const V tolerance = hn::Set(d, kEndTolerance);
+    const auto lowDiffers = hn::And(hn::Ne(hn::Ceil(low), begin), hn::Gt(hn::Sub(low, begin), tolerance));
+    const auto highDiffers = hn::And(hn::Ne(hn::Floor(high), end), hn::Gt(hn::Sub(end, high), tolerance));
+    return hn::And(hn::Le(begin, end), hn::Or(hn::Gt(low, high), hn::Or(lowDiffers, highDiffers)));
+}
+
+// Replaces the ends of the scanlines that double precision can't decide.
+HWY_NOINLINE void decideEnds(Walk& walk, M doubtful, V t, V r, V& begin, V& end) {
+    const D d;
+    alignas(64) double ts[kBatch], rs[kBatch], begins[kBatch], ends[kBatch];
+    std::uint8_t bits[8] = {};
+    hn::Store(t, d, ts);
+    hn::Store(r, d, rs);
+    hn::Store(begin, d, begins);
+    hn::Store(end, d, ends);
+    hn::StoreMaskBits(d, doubtful, bits);
+    if (!walk.exact) walk.exact.emplace(walk.input, walk.element, walk.axis);
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i)
+        if ((bits[0] >> i) & 1) walk.exact->ends(ts[i], rs[i], begins[i], ends[i]);
+    begin = hn::Load(d, begins);
+    end = hn::Load(d, ends);
 }
 
 // Scanlines of one element inside the region; `Lower` of the four faces, those first in `order`, bound s from below.
@@ -327,9 +401,12 @@ void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const 
     const Batch& batch = walk.scratch.batch;
     const int lane = walk.lane;
     const std::size_t channels = walk.input.channels.size();
+    const bool isDoubtful = batch.grade[lane] == kDoubtful;
     const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]);
     const V fromS = hn::Set(d, from[0]), toS = hn::Set(d, to[0]), toR = hn::Set(d, to[2]);
-    alignas(64) double start[kBatch], first[kBatch], last[kBatch], rows[kBatch], ts[kBatch], rs[kBatch];
+    const V origin = hn::Set(d, double(walk.origin)), strideS = hn::Set(d, double(walk.strideS)),
+            strideT = hn::Set(d, double(walk.strideT)), strideR = hn::Set(d, double(walk.strideR));
+    Rows rows;
     for (double t0 = from[1]; t0 <= to[1]; t0 += kBatch) {
         const int count = int(std::min<double>(kBatch, to[1] - t0 + 1));
         const int perVector = table.perVector[count];
@@ -349,34 +426,37 @@ void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const 
                     else
                         high = hn::Min(high, bound);
                 }
-                const V begin = hn::Ceil(low), end = hn::Floor(high);
+                V begin = hn::Ceil(low), end = hn::Floor(high);
+                if (isDoubtful) {
+                    const auto used = hn::Le(r, toR);
+                    const auto doubtful =
+                        hn::And(used, doubtfulEnds<Lower>(batch, lane, order, t, r, minS, maxS, begin, end));
+                    if (!hn::AllFalse(d, doubtful)) decideEnds(walk, doubtful, t, r, begin, end);
+                }
                 const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
                 const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
                 if (hn::AllFalse(d, inside)) continue;
-                hn::Store(begin, d, start + q);
-                hn::Store(clippedBegin, d, first + q);
-                hn::Store(clippedEnd, d, last + q);
-                hn::Store(t, d, ts + q);
-                hn::Store(r, d, rs + q);
+                hn::Store(hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
+                                  hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR))),
+                          d, rows.offset + q);
+                hn::Store(hn::Add(hn::Sub(clippedEnd, clippedBegin), hn::Set(d, 1.0)), d, rows.length + q);
+                hn::Store(hn::Sub(clippedBegin, begin), d, rows.skipped + q);
                 std::uint8_t bits[8] = {};
                 hn::StoreMaskBits(d, inside, bits);
                 hit |= unsigned(bits[0]) << q;
                 for (std::size_t c = 0; c < channels; ++c) {
-                    const BatchChannel& channel = walk.scratch.channels[c];
+                    BatchChannel& channel = walk.scratch.channels[c];
                     const V value = hn::Add(hn::Add(hn::Add(hn::Set(d, channel.constant[lane]),
                                                             hn::Mul(hn::Set(d, channel.gradientT[lane]), t)),
                                                     hn::Mul(hn::Set(d, channel.gradientR[lane]), r)),
                                             hn::Mul(hn::Set(d, channel.gradientS[lane]), begin));
-                    hn::Store(value, d, rows);
-                    for (std::size_t i = 0; i < hn::Lanes(d); ++i)
-                        walk.scratch.first[c * kBatch + q + i] = float(rows[i]);
+                    hn::Store(value, d, channel.first + q);
                 }
             }
             walk.counts.scanlines += count * perVector;
-            for (; hit; hit &= hit - 1) {
-                const int row = std::countr_zero(hit);
-                writeRun(walk, start[row], first[row], last[row], ts[row], rs[row], row);
-            }
+            for (unsigned ahead = hit; ahead; ahead &= ahead - 1)
+                __builtin_prefetch(walk.output.owner + std::int64_t(rows.offset[std::countr_zero(ahead)]), 1);
+            for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
         }
     }
 }
@@ -405,12 +485,11 @@ void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scra
         else
             order[--upper] = k;
     }
-    for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
-        const double limit = std::numeric_limits<float>::max();
-        scratch.step[c] = float(std::clamp(scratch.channels[c].gradientS[lane], -limit, limit));
-    }
+    constexpr double kLimit = std::numeric_limits<float>::max();
+    for (BatchChannel& channel : scratch.channels)
+        channel.step = float(std::clamp(channel.gradientS[lane], -kLimit, kLimit));
     Walk walk{input, output, scratch, counts, element, lane, output.stride[axes[0]], output.stride[axes[1]],
-              output.stride[axes[2]], 0, axis, {}};
+              output.stride[axes[2]], 0, axis, {}, {}};
     for (int a = 0; a < 3; ++a)
         walk.origin += (std::int64_t(batch.base[a][lane]) - output.blockBox.min[a]) * output.stride[a];
     switch (lower) {
@@ -425,8 +504,6 @@ void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scra
 void scan(const ScanInput& input, const ScanOutput& output, std::span<const std::int32_t> elements, ScanCounts& counts) {
     static thread_local Scratch scratch;
     scratch.channels.resize(input.channels.size());
-    scratch.first.resize(input.channels.size() * kBatch);
-    scratch.step.resize(input.channels.size());
     for (std::size_t begin = 0; begin < elements.size(); begin += kBatch) {
         const int count = int(std::min<std::size_t>(kBatch, elements.size() - begin));
         const std::int32_t* batchElements = elements.data() + begin;
@@ -434,7 +511,7 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         for (std::size_t c = 0; c < input.channels.size(); ++c)
             loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);
         for (int lane = 0; lane < count; ++lane) {
-            if (scratch.batch.easy[lane] != 0.0)
+            if (scratch.batch.grade[lane] != kThin)
                 walkElement(input, output, scratch, batchElements[lane], lane, counts);
             else
                 scanElementExactly(input, output, batchElements[lane], counts);

@@ -28,6 +28,9 @@ void checkLattice(const Lattice& lattice, std::span<const IndexBox> boxes) {
         if (!(length > 0) || !std::isfinite(length) || !std::isfinite(lattice.originWorld[a]))
             throw InputError("the lattice's origin must be finite and its spacing positive and finite");
     }
+    const double volume = glm::dot(lattice.uWorld, glm::cross(lattice.vWorld, lattice.wWorld));
+    const double cube = glm::length(lattice.uWorld) * glm::length(lattice.vWorld) * glm::length(lattice.wWorld);
+    if (!(std::fabs(volume) > 1e-9 * cube)) throw InputError("the lattice's steps u, v and w must not lie in one plane");
     for (const IndexBox& box : boxes)
         for (int a = 0; a < 3; ++a)
             if (box.min[a] < -kIndexLimit || box.max[a] > kIndexLimit || box.min[a] > box.max[a])
@@ -88,7 +91,7 @@ std::vector<Region> planRegions(std::span<const IndexBox> boxes, int threads) {
 
 class BoundSoftware : public BoundResampler {
   public:
-    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, ScanFunction scan) : mesh_(mesh), scan_(scan) {
+    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const ScanTarget& target) : mesh_(mesh), target_(target) {
         if (mesh.elementCount() > kElementMask) throw InputError("a mesh may have at most 2^30 - 1 elements");
         for (const int f : fields) {
             TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
@@ -97,6 +100,8 @@ class BoundSoftware : public BoundResampler {
                 channels_.push_back({field.values.data(), field.components, c, field.location == FieldLocation::cell});
         }
     }
+
+    std::string_view target() const override { return target_.name; }
 
     ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes, const BlockSink& sink,
                                 const Execution& execution) override {
@@ -198,7 +203,7 @@ class BoundSoftware : public BoundResampler {
             std::fill_n(output.owner + offset, rowLength, kNoOwner);
             for (float* values : output.values) std::fill_n(values + offset, rowLength, 0.0f);
         });
-        scan_(input, output, elements, counts);
+        target_.scan(input, output, elements, counts);
         std::int64_t covered = 0;
         forEachRow([&](std::int64_t offset) {
             const std::int32_t* owner = output.owner + offset;
@@ -214,7 +219,7 @@ class BoundSoftware : public BoundResampler {
     }
 
     const TetMesh& mesh_;
-    ScanFunction scan_;
+    const ScanTarget& target_;
     std::vector<ScanChannel> channels_;
 };
 
@@ -233,7 +238,7 @@ std::unique_ptr<BoundResampler> SoftwareResampler::bind(const TetMesh& mesh, std
                                                         std::string_view target) const {
     for (const ScanTarget& candidate : scanTargets())
         if (target.empty() || candidate.name == target)
-            return std::make_unique<BoundSoftware>(mesh, fields, candidate.scan);
+            return std::make_unique<BoundSoftware>(mesh, fields, candidate);
     throw InputError("the software resampler has no target named " + std::string(target) + " on this processor");
 }
 

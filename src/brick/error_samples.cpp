@@ -1,0 +1,251 @@
+#include "brick/error_samples.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "mesh/geometry.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::int64_t kChunk = 16384;
+
+SampledField describe(const Field& field, int firstChannel) {
+    SampledField result{&field, firstChannel, 0, 0};
+    for (int c = 0; c < field.components; ++c) {
+        const ValueRange range = fieldRange(field, c);
+        if (range.empty()) continue;
+        result.range = std::max(result.range, range.width());
+        result.largest = std::max({result.largest, std::abs(range.min), std::abs(range.max)});
+    }
+    return result;
+}
+
+}  // namespace
+
+ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
+    : mesh_(&mesh), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
+    TESSERA_CHECK(mesh.points.size() + mesh.tets.size() < (std::size_t(1) << 32), "samples are counted in 32 bits");
+    fields_.resize(fields.size());
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+        fields_[f].firstChannel = channels_;
+        channels_ += mesh.fields[std::size_t(fields[f])].components;
+    }
+    parallelFor(execution, std::int64_t(fields.size()), [&](std::int64_t f) {
+        fields_[std::size_t(f)] =
+            describe(mesh.fields[std::size_t(fields[std::size_t(f)])], fields_[std::size_t(f)].firstChannel);
+    });
+    std::atomic<std::int64_t> flat{0}, inverted{0};
+    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        std::int64_t chunkFlat = 0, chunkInverted = 0;
+        for (std::int64_t e = begin; e < end; ++e) {
+            const auto& tet = mesh.tets[std::size_t(e)];
+            const int sign = volumeSign(mesh.points[std::size_t(tet[0])], mesh.points[std::size_t(tet[1])],
+                                        mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]);
+            chunkFlat += sign == 0;
+            chunkInverted += sign < 0;
+            if (sign == 0) continue;
+            // A volume that underflows or cancels to 0 in double still belongs to an element that is there.
+            volume_[std::size_t(e)] =
+                std::max(std::abs(signedVolume(mesh, e)), std::numeric_limits<double>::denorm_min());
+            for (const std::int32_t node : tet) {
+                std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
+                if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
+            }
+        }
+        flat += chunkFlat;
+        inverted += chunkInverted;
+    });
+    flat_ = flat;
+    inverted_ = inverted;
+}
+
+Vec3d ErrorSamples::placeWorld(std::size_t sample, const Vec3d& originWorld) const {
+    const auto& points = mesh_->points;
+    if (sample < usedNode_.size()) return points[sample] - originWorld;
+    const auto& tet = mesh_->tets[sample - usedNode_.size()];
+    return 0.25 * ((points[std::size_t(tet[0])] - originWorld) + (points[std::size_t(tet[1])] - originWorld) +
+                   (points[std::size_t(tet[2])] - originWorld) + (points[std::size_t(tet[3])] - originWorld));
+}
+
+double ErrorSamples::exactValue(std::size_t sample, const Field& field, int component) const {
+    if (sample < usedNode_.size()) return field.at(std::int64_t(sample), component);
+    const std::size_t element = sample - usedNode_.size();
+    if (field.location == FieldLocation::cell) return field.at(std::int64_t(element), component);
+    const auto& tet = mesh_->tets[element];
+    return 0.25 * (field.at(tet[0], component) + field.at(tet[1], component) + field.at(tet[2], component) +
+                   field.at(tet[3], component));
+}
+
+namespace {
+
+constexpr std::int32_t kNoSample = -2;
+constexpr std::int32_t kOutside = -1;
+
+std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0) {
+    std::int64_t leaf = tree.findLeafAt(index0);
+    if (leaf < 0) {
+        // A place on the mesh's lower side can round to just below the first brick.
+        const Vec3d whole = glm::round(index0);
+        Vec3d snapped = index0;
+        for (int a = 0; a < 3; ++a)
+            if (std::abs(index0[a] - whole[a]) < 1e-6) snapped[a] = whole[a];
+        leaf = tree.findLeafAt(snapped);
+    }
+    return leaf < 0 ? kOutside : std::int32_t(leaf);
+}
+
+bool contains(const Box3d& box, const Vec3d& p) {
+    return p.x >= box.min.x && p.y >= box.min.y && p.z >= box.min.z && p.x <= box.max.x && p.y <= box.max.y &&
+           p.z <= box.max.z;
+}
+
+}  // namespace
+
+SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree, const std::optional<Box3d>& boundsWorld,
+                          const Execution& execution) {
+    std::vector<std::int32_t> leafOf(samples.count(), kNoSample);
+    const double inverse = 1.0 / tree.spacingWorld(0);
+    const Vec3d origin = tree.originWorld();
+    std::optional<Box3d> bounds;
+    if (boundsWorld) bounds = Box3d{boundsWorld->min - origin, boundsWorld->max - origin};
+    parallelForChunks(execution, std::int64_t(samples.count()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t s = begin; s < end; ++s) {
+            if (!samples.exists(std::size_t(s))) continue;
+            const Vec3d place = samples.placeWorld(std::size_t(s), origin);
+            leafOf[std::size_t(s)] = bounds && !contains(*bounds, place) ? kOutside : leafOfPlace(tree, place * inverse);
+        }
+    });
+    SamplesByLeaf sorted;
+    sorted.first.assign(tree.leafCount() + 1, 0);
+    for (const std::int32_t leaf : leafOf) {
+        if (leaf >= 0) ++sorted.first[std::size_t(leaf) + 1];
+        sorted.outside += leaf == kOutside;
+    }
+    for (std::size_t i = 1; i < sorted.first.size(); ++i) sorted.first[i] += sorted.first[i - 1];
+    sorted.ids.resize(sorted.first.back());
+    std::vector<std::size_t> next(sorted.first.begin(), sorted.first.end() - 1);
+    for (std::size_t s = 0; s < leafOf.size(); ++s)
+        if (leafOf[s] >= 0) sorted.ids[next[std::size_t(leafOf[s])]++] = std::uint32_t(s);
+    return sorted;
+}
+
+LeafSampler::LeafSampler(const ErrorSamples& samples, const BrickTree& tree, const BrickStore& store,
+                         const Reconstruction& reconstruction)
+    : samples_(&samples),
+      tree_(&tree),
+      store_(&store),
+      reconstruction_(&reconstruction),
+      values_(std::size_t(store.channels())),
+      slotOf_(std::size_t(tree.brickCells() + 1) * std::size_t(tree.brickCells() + 1) * std::size_t(tree.brickCells() + 1), -1) {}
+
+void LeafSampler::enter(std::size_t leaf) {
+    leaf_ = leaf;
+    const BrickKey& key = tree_->leaves()[leaf];
+    firstPoint_ = key.index * tree_->brickCells();
+    inverseSpacing_ = 1.0 / tree_->spacingWorld(key.level);
+    for (const std::int32_t slot : touched_) slotOf_[std::size_t(slot)] = -1;
+    touched_.clear();
+    slotValues_.clear();
+    slotCovered_.clear();
+    coarserNear_ = false;
+    if (key.level + 1 >= tree_->levelCount()) return;
+    for (int n = 0; n < 27 && !coarserNear_; ++n) {
+        const BrickKey near{key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
+        const std::int64_t other = tree_->findCovering(near);
+        coarserNear_ = other >= 0 && tree_->leaves()[std::size_t(other)].level > key.level;
+    }
+}
+
+bool LeafSampler::readCorners(const Vec3i& cell, Corners& corners) const {
+    const int n = store_->tilesPerEdge();
+    for (int c = 0; c < 8; ++c) {
+        const Vec3i p = cell + cornerOffset(c);
+        const Tile* tile = store_->tile(leaf_, ((p.x >> 3) * n + (p.y >> 3)) * n + (p.z >> 3));
+        const int offset = ((p.x & 7) * 8 + (p.y & 7)) * 8 + (p.z & 7);
+        if (!tile || !tile->covered(offset)) return false;
+        corners.tile[c] = tile;
+        corners.offset[c] = offset;
+    }
+    return true;
+}
+
+bool LeafSampler::reconstructSlowly(const CellPlace& place) {
+    const std::size_t channels = values_.size();
+    const int edge = tree_->brickCells() + 1;
+    bool covered = true;
+    std::fill(values_.begin(), values_.end(), 0.0);
+    for (int c = 0; c < 8; ++c) {
+        const double weight = cornerWeight(place.fraction, c);
+        if (weight == 0) continue;
+        const Vec3i p = place.cell + cornerOffset(c);
+        std::int32_t& slot = slotOf_[std::size_t((p.z * edge + p.y) * edge + p.x)];
+        if (slot < 0) {
+            slot = std::int32_t(slotCovered_.size());
+            touched_.push_back((p.z * edge + p.y) * edge + p.x);
+            slotValues_.resize(slotValues_.size() + channels);
+            slotCovered_.push_back(reconstruction_->resolve(
+                tree_->leaves()[leaf_].level, firstPoint_ + p, 0,
+                std::span(slotValues_).last(channels)));
+        }
+        covered &= slotCovered_[std::size_t(slot)] != 0;
+        const double* corner = slotValues_.data() + std::size_t(slot) * channels;
+        for (std::size_t v = 0; v < channels; ++v) values_[v] += weight * corner[v];
+    }
+    return covered;
+}
+
+bool LeafSampler::fieldErrors(std::size_t sample, std::span<double> errors) const {
+    const bool isNode = sample < samples_->nodeCount();
+    bool allFinite = true;
+    for (std::size_t f = 0; f < errors.size(); ++f) {
+        const SampledField& sampled = samples_->fields()[f];
+        if (isNode && sampled.isCell()) {
+            errors[f] = -1;
+            continue;
+        }
+        const int components = sampled.field->components;
+        double sum = 0;
+        for (int c = 0; c < components; ++c) {
+            const double difference = values_[std::size_t(sampled.firstChannel + c)] -
+                                      samples_->exactValue(sample, *sampled.field, c);
+            sum += components == 1 ? std::abs(difference) : difference * difference;
+        }
+        errors[f] = components == 1 ? sum : std::sqrt(sum);
+        if (!std::isfinite(errors[f])) {
+            errors[f] = std::numeric_limits<double>::quiet_NaN();
+            allFinite = false;
+        }
+    }
+    return allFinite;
+}
+
+bool LeafSampler::measure(std::size_t sample, std::span<double> errors) {
+    const int b = tree_->brickCells();
+    const Vec3d index = samples_->placeWorld(sample, tree_->originWorld()) * inverseSpacing_;
+    const CellPlace place = locateInBrick(index - Vec3d(firstPoint_), b);
+    const Vec3i& cell = place.cell;
+    const int low = coarserNear_ ? 1 : 0;
+    Corners corners;
+    if (cell.x >= low && cell.y >= low && cell.z >= low && cell.x + 1 < b && cell.y + 1 < b && cell.z + 1 < b &&
+        readCorners(cell, corners)) {
+        double weights[8];
+        for (int c = 0; c < 8; ++c) weights[c] = cornerWeight(place.fraction, c);
+        for (std::size_t v = 0; v < values_.size(); ++v) {
+            double sum = 0;
+            for (int c = 0; c < 8; ++c) sum += weights[c] * double(corners.tile[c]->channel(int(v))[corners.offset[c]]);
+            values_[v] = sum;
+        }
+        // A value that isn't finite may have come from a corner of weight zero: the slow way leaves those out.
+        if (fieldErrors(sample, errors)) return true;
+    }
+    const bool covered = reconstructSlowly(place);
+    fieldErrors(sample, errors);
+    return covered;
+}
+
+}  // namespace tessera

@@ -1,0 +1,192 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+
+#include "base/error.h"
+#include "brick/plan_frame.h"
+
+namespace tessera {
+
+namespace {
+
+// Share of a brick's elements that may be smaller than the size its spacing follows. The quantile counts elements, not volume: by
+// volume a graded region much smaller than the brick would never be seen.
+constexpr double kSizeQuantile = 0.15;
+// Without any bound or spacing from the user a plan by element size stays below this.
+constexpr std::int64_t kDefaultElementSizeVoxels = 20'000'000;
+
+std::string shortNumber(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return text;
+}
+
+// An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and so an
+// ordinary size; flat boundary-layer elements come out between their thickness and their length.
+std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Execution& execution) {
+    std::vector<float> sizes(mesh.tets.size());
+    parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t e = begin; e < end; ++e) {
+            const auto nodes = elementInIndexSpace(mesh, e, Vec3d(0), unit);
+            double product = 1;
+            for (std::size_t a = 0; a < 4; ++a)
+                for (std::size_t b = a + 1; b < 4; ++b) {
+                    const Vec3d edge = nodes[b] - nodes[a];
+                    product *= glm::dot(edge, edge);
+                }
+            sizes[std::size_t(e)] = float(std::pow(product, 1.0 / 12));
+        }
+    });
+    return sizes;
+}
+
+// The size that a brick's spacing follows; infinite when no element has one.
+double localSize(const PlannedBrick& brick, const std::vector<float>& sizes) {
+    std::vector<float> local;
+    local.reserve(brick.elements.size());
+    for (const std::int32_t e : brick.elements)
+        if (sizes[std::size_t(e)] > 0) local.push_back(sizes[std::size_t(e)]);
+    if (local.empty()) return std::numeric_limits<double>::infinity();
+    const auto at = local.begin() + std::ptrdiff_t(kSizeQuantile * double(local.size()));
+    std::nth_element(local.begin(), at, local.end());
+    return double(*at);
+}
+
+std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxLeaves, std::vector<BrickKey>* keys,
+                          const Execution& execution) {
+    const std::int64_t count = touchedBricks(mesh, frame, std::int64_t(maxLeaves), keys, execution);
+    if (count >= 0) return count;
+    // Too large a box of bricks for a grid of marks: go down from coarse bricks, leaving empty space out on the way.
+    const int down = 8;
+    frame.rootSpacingWorld = std::ldexp(frame.rootSpacingWorld, down);
+    frame.maxDepth = down;
+    BrickPlan plan(mesh, frame, execution);
+    for (int depth = 0; depth < down; ++depth) {
+        std::vector<BrickKey> all;
+        for (const PlannedBrick* brick : plan.leaves()) all.push_back(brick->key);
+        if (!plan.split(all, maxLeaves, execution)) return std::int64_t(maxLeaves) + 1;
+    }
+    if (keys)
+        for (const PlannedBrick* brick : plan.leaves()) keys->push_back({0, brick->key.index});
+    return std::int64_t(plan.leafCount());
+}
+
+// Largest resolution whose plan fits, by bisection; 0 when none does.
+int largestResolution(const TetMesh& mesh, RefineOptions options, std::size_t maxLeaves, int tooLarge,
+                      const Execution& execution) {
+    options.frame.reset();
+    options.spacingWorld = 0;
+    int fits = 1, fails = tooLarge;
+    while (fails - fits > std::max(1, fits / 64)) {
+        // Counts grow with the cube; aim at a tenth of the interval first when it is wide.
+        options.resolution = fails > 8 * fits ? std::max(fits + 1, int(std::sqrt(double(fits) * fails)))
+                                              : (fits + fails) / 2;
+        const std::int64_t count = countUniform(mesh, chooseFrame(mesh, options), maxLeaves, nullptr, execution);
+        (count <= std::int64_t(maxLeaves) ? fits : fails) = options.resolution;
+    }
+    return fits > 1 ? fits : 0;
+}
+
+std::string budgetText(const RefineOptions& options, std::size_t maxLeaves) {
+    const double points = double(maxLeaves) * std::pow(options.brickCells, 3);
+    return shortNumber(points) + " voxels (" +
+           (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound" : "a quarter of the memory here") + ")";
+}
+
+BrickTree planUniform(const TetMesh& mesh, const RefineOptions& options, std::size_t maxLeaves,
+                      const Execution& execution) {
+    const PlanFrame frame = chooseFrame(mesh, options);
+    std::vector<BrickKey> keys;
+    const std::int64_t count = countUniform(mesh, frame, maxLeaves, &keys, execution);
+    if (count > std::int64_t(maxLeaves)) {
+        const Vec3d size = (options.boundsWorld ? *options.boundsWorld : mesh.boundsWorld()).size();
+        const double longest = std::max({size.x, size.y, size.z});
+        const int points = int(std::min(5e8, std::ceil(longest / frame.spacingWorld(0)) + 1));
+        const int fits = largestResolution(mesh, options, maxLeaves, points, execution);
+        throw InputError("the uniform lattice of " + std::to_string(points) +
+                         " points along the longest axis needs more than " + budgetText(options, maxLeaves) +
+                         (fits ? "; a resolution of " + std::to_string(fits) + " (spacing " +
+                                     shortNumber(longest / (fits - 1)) + ") fits"
+                               : "; not even one brick fits"));
+    }
+    return BrickTree(frame.originWorld, frame.spacingWorld(frame.maxDepth), frame.brickCells, std::move(keys));
+}
+
+BrickTree planByElementSize(const TetMesh& mesh, const RefineOptions& options, std::size_t maxLeaves,
+                            const Execution& execution, std::vector<std::string>* notes) {
+    const PlanFrame frame = chooseFrame(mesh, options);
+    const bool isDefault = options.maxVoxels == 0 && options.maxMemoryBytes == 0 && !hasFinestSpacing(options);
+    const std::size_t brickPoints = std::size_t(std::pow(options.brickCells, 3));
+    if (isDefault) maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
+    const std::vector<float> sizes = elementSizes(mesh, frame.rootSpacingWorld, execution);
+    BrickPlan plan(mesh, frame, execution);
+    if (plan.leafCount() > maxLeaves)
+        throw InputError("the coarsest plan has " + std::to_string(plan.leafCount() * brickPoints) +
+                         " voxels, more than " + budgetText(options, maxLeaves) +
+                         "; smaller bricks, a larger spacing or smaller bounds need fewer");
+    for (int depth = 0; depth < frame.maxDepth; ++depth) {
+        execution.report("plan", depth, frame.maxDepth);
+        const auto leaves = plan.leaves();
+        std::vector<std::uint8_t> wanted(leaves.size(), 0);
+        parallelFor(execution, std::int64_t(leaves.size()), [&](std::int64_t i) {
+            const PlannedBrick& brick = *leaves[std::size_t(i)];
+            if (brick.key.level != depth) return;
+            const double spacing = std::ldexp(1.0, -depth);   // in units of the root spacing, as the sizes are
+            wanted[std::size_t(i)] = spacing > localSize(brick, sizes) / options.samplesPerElement ? 1 : 0;
+        });
+        std::vector<BrickKey> splits;
+        for (std::size_t i = 0; i < leaves.size(); ++i)
+            if (wanted[i]) splits.push_back(leaves[i]->key);
+        if (splits.empty()) break;
+        if (plan.split(splits, maxLeaves, execution)) continue;
+        const std::string fits = shortNumber(frame.spacingWorld(depth));
+        if (hasFinestSpacing(options))
+            throw InputError("bricks down to a spacing of " + shortNumber(frame.spacingWorld(frame.maxDepth)) +
+                             " need more than " + budgetText(options, maxLeaves) + "; a finest spacing of " + fits + " fits");
+        if (notes)
+            notes->push_back("the elements ask for a spacing below " + fits + ", which would take more than " +
+                             shortNumber(double(maxLeaves * brickPoints)) + " voxels: the finest spacing is " + fits);
+        break;
+    }
+    return plan.tree(options.frame ? frame.maxDepth : -1);
+}
+
+}  // namespace
+
+BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution, int channels,
+                     std::vector<std::string>* notes) {
+    checkOptions(mesh, options);
+    TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");
+    execution.report("plan", 0, 1);
+    const std::size_t maxLeaves = leafBudget(options, channels);
+    BrickTree tree = options.criterion == Criterion::uniform
+                         ? planUniform(mesh, options, maxLeaves, execution)
+                         : planByElementSize(mesh, options, maxLeaves, execution, notes);
+    execution.report("plan", 1, 1);
+    return tree;
+}
+
+PlanEstimate estimatePlan(const BrickTree& tree, int channels) {
+    PlanEstimate estimate;
+    const std::int64_t b = tree.brickCells();
+    estimate.bricksPerLevel.assign(std::size_t(tree.levelCount()), 0);
+    double flat = 0;
+    int finest = tree.levelCount();
+    for (const BrickKey& key : tree.leaves()) {
+        ++estimate.bricksPerLevel[std::size_t(key.level)];
+        finest = std::min(finest, key.level);
+        flat += std::ldexp(double(b * b * b), 3 * key.level);
+    }
+    flat = std::ldexp(flat, -3 * finest);
+    constexpr double kMost = 9e18;
+    const double bytesPerPoint = 4.0 * channels + 0.125;
+    estimate.storedPoints = std::int64_t(tree.leafCount()) * b * b * b;
+    estimate.levelsBytes = std::int64_t(double(estimate.storedPoints) * bytesPerPoint);
+    estimate.flatPoints = std::int64_t(std::min(flat, kMost));
+    estimate.flatBytes = std::int64_t(std::min(flat * bytesPerPoint, kMost));
+    return estimate;
+}
+
+}  // namespace tessera

@@ -1,0 +1,134 @@
+#include "brick/plan_frame.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "base/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr double kMaxIndex = 1 << 29;             // of level 0; resamplers take indices up to 2^30
+constexpr int kDefaultUniformResolution = 256;
+constexpr int kDefaultLevels = 8;
+
+std::string shortNumber(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", value);
+    return text;
+}
+
+bool finite(const Vec3d& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+double longestSide(const Box3d& box) {
+    const Vec3d size = box.size();
+    return std::max({size.x, size.y, size.z});
+}
+
+// Largest |index| of the box along any axis.
+double farthestIndex(const Box3d& box, const Vec3d& origin, double spacing) {
+    const Vec3d far = glm::max(glm::abs(box.min - origin), glm::abs(box.max - origin)) / spacing;
+    return std::max({far.x, far.y, far.z});
+}
+
+int rootPoints(int brickCells) { return brickCells == 8 ? 32 : 64; }
+
+double finestSpacing(const RefineOptions& options, double longest) {
+    if (options.frame) return options.frame->spacingWorld;
+    if (options.spacingWorld > 0) return options.spacingWorld;
+    const int points = options.resolution > 0 ? options.resolution : kDefaultUniformResolution;
+    return longest / (points - 1);
+}
+
+}  // namespace
+
+void checkOptions(const TetMesh& mesh, const RefineOptions& options) {
+    const auto require = [](bool condition, const std::string& message) {
+        if (!condition) throw InputError(message);
+    };
+    require(mesh.elementCount() > 0, "the mesh has no elements");
+    const int b = options.brickCells;
+    require(b == 8 || b == 16 || b == 32 || b == 64,
+            "the brick size must be 8, 16, 32 or 64, not " + std::to_string(b));
+    require(options.resolution == 0 || options.resolution >= 2,
+            "the resolution must be at least 2 points, not " + std::to_string(options.resolution));
+    require(std::isfinite(options.spacingWorld) && options.spacingWorld >= 0,
+            "the spacing must be positive, not " + shortNumber(options.spacingWorld));
+    require(options.resolution == 0 || options.spacingWorld == 0, "give a resolution or a spacing, not both");
+    require(std::isfinite(options.samplesPerElement) && options.samplesPerElement > 0,
+            "samples per element must be positive, not " + shortNumber(options.samplesPerElement));
+    require(options.maxLevels >= 0, "the number of levels must be at least 1, not " + std::to_string(options.maxLevels));
+    require(options.maxVoxels >= 0 && options.maxMemoryBytes >= 0, "bounds on voxels and memory must be positive");
+    if (options.criterion == Criterion::error)
+        require(std::isfinite(options.maxError) && options.maxError > 0,
+                "the error bound must be positive, not " + shortNumber(options.maxError));
+    if (options.frame)
+        require(finite(options.frame->originWorld) && std::isfinite(options.frame->spacingWorld) &&
+                    options.frame->spacingWorld > 0,
+                "the given lattice's spacing must be positive and finite");
+    const Box3d meshBox = mesh.boundsWorld();
+    require(longestSide(meshBox) > 0, "the mesh has no extent: all nodes coincide");
+    if (options.boundsWorld) {
+        const Box3d& box = *options.boundsWorld;
+        require(finite(box.min) && finite(box.max) && !box.empty() && longestSide(box) > 0,
+                "the bounds must be a box with min below max");
+        Box3d common{glm::max(box.min, meshBox.min), glm::min(box.max, meshBox.max)};
+        require(!common.empty(), "the bounds do not meet the mesh");
+    }
+}
+
+PlanFrame chooseFrame(const TetMesh& mesh, const RefineOptions& options) {
+    const Box3d meshBox = mesh.boundsWorld();
+    const Box3d box = options.boundsWorld ? *options.boundsWorld : meshBox;
+    const Box3d sampled{glm::max(box.min, meshBox.min), glm::min(box.max, meshBox.max)};
+    const double longest = longestSide(box);
+    const double rootCells = rootPoints(options.brickCells) - 1;
+
+    PlanFrame frame;
+    frame.brickCells = options.brickCells;
+    frame.boundsWorld = options.boundsWorld;
+    frame.originWorld = options.frame ? options.frame->originWorld : box.min;
+    const int levels = options.maxLevels > 0                              ? options.maxLevels
+                       : options.criterion == Criterion::elementSize ? kDefaultLevels
+                                                                          : 31;
+    if (options.criterion == Criterion::uniform || hasFinestSpacing(options)) {
+        const double finest = finestSpacing(options, longest);
+        const double far = farthestIndex(sampled, frame.originWorld, finest);
+        if (!(far < kMaxIndex))
+            throw InputError("a spacing of " + shortNumber(finest) + " makes " + shortNumber(far) +
+                             " lattice points along an axis, more than 2^29; the finest that fits is " +
+                             shortNumber(finest * far / kMaxIndex * 1.01));
+        int depth = 0;
+        if (options.criterion != Criterion::uniform)
+            while (depth + 1 < levels && longest / std::ldexp(finest, depth + 1) >= rootCells) ++depth;
+        frame.rootSpacingWorld = std::ldexp(finest, depth);
+        frame.maxDepth = depth;
+        return frame;
+    }
+    frame.rootSpacingWorld = longest / rootCells;
+    const double far = std::max(1.0, farthestIndex(sampled, frame.originWorld, frame.rootSpacingWorld));
+    while (frame.maxDepth + 1 < levels && std::ldexp(far, frame.maxDepth + 1) < kMaxIndex) ++frame.maxDepth;
+    return frame;
+}
+
+std::size_t leafBudget(const RefineOptions& options, int channels) {
+    const double bytesPerPoint = 4.0 * channels + 0.125;
+    double points = 2147483648.0;
+    if (options.maxVoxels > 0) {
+        points = double(options.maxVoxels);
+    } else {
+        const long pages = sysconf(_SC_PHYS_PAGES), pageBytes = sysconf(_SC_PAGE_SIZE);
+        if (pages > 0 && pageBytes > 0)
+            points = std::min(points, double(pages) * double(pageBytes) / 4 / bytesPerPoint);
+    }
+    if (options.maxMemoryBytes > 0) points = std::min(points, double(options.maxMemoryBytes) / bytesPerPoint);
+    const double brickPoints = double(options.brickCells) * options.brickCells * options.brickCells;
+    return std::size_t(points / brickPoints);
+}
+
+}  // namespace tessera

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "brick/brick_plan.h"
+#include "brick/refine.h"
+
+namespace tessera {
+
+/// Throws InputError for options out of range or that contradict each other.
+void checkOptions(const TetMesh& mesh, const RefineOptions& options);
+
+/// True when the user fixed the finest spacing.
+inline bool hasFinestSpacing(const RefineOptions& options) {
+    return options.resolution > 0 || options.spacingWorld > 0 || options.frame.has_value();
+}
+
+/// The lattices for these options. With a finest spacing given, depth frame.maxDepth has it; else depth 0 has 64 points (32 for
+/// bricks of 8) along the longest axis, from the bounds' minimum to their maximum, and so has every finer one.
+PlanFrame chooseFrame(const TetMesh& mesh, const RefineOptions& options);
+
+/// Leaves that the bounds on voxels and memory allow.
+std::size_t leafBudget(const RefineOptions& options, int channels);
+
+}  // namespace tessera

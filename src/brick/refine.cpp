@@ -1,0 +1,375 @@
+#include "brick/refine.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <tuple>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "brick/error_samples.h"
+#include "brick/measure_error.h"
+#include "brick/plan_frame.h"
+#include "brick/resample_tree.h"
+
+namespace tessera {
+
+namespace {
+
+// Error-driven refinement without bounds from the user stops here: a gigabyte a channel.
+constexpr std::int64_t kDefaultErrorVoxels = std::int64_t(1) << 28;
+
+std::string shortNumber(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return text;
+}
+
+std::string placeText(const Vec3d& p) {
+    char text[96];
+    std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
+    return text;
+}
+
+// The bound on one field, in field units; infinite for fields that don't matter.
+struct FieldBound {
+    std::size_t field = 0;    // position among the chosen fields
+    double bound = 0;
+};
+
+std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fields, const ErrorSamples& samples,
+                                    const RefineOptions& options) {
+    std::vector<FieldBound> bounds;
+    bool onlyCells = true;
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+        const Field& field = mesh.fields[std::size_t(fields[f])];
+        const bool isCell = field.location == FieldLocation::cell;
+        const bool named = std::find(options.errorFields.begin(), options.errorFields.end(), fields[f]) !=
+                           options.errorFields.end();
+        if (!named && (!options.errorFields.empty() || (isCell && options.measure == ErrorMeasure::max))) continue;
+        onlyCells = onlyCells && isCell;
+        const double range = samples.fields()[f].range;
+        const double bound = options.maxErrorIsRelative ? options.maxError * range : options.maxError;
+        if (bound == 0) continue;   // a constant field has no relative error
+        const double roundOff = std::ldexp(samples.fields()[f].largest, -24);
+        if (bound < roundOff)
+            throw InputError("an error bound of " + shortNumber(bound) + " on field " + field.name +
+                             " is below what 32-bit samples of its values can hold; the smallest that makes sense is " +
+                             shortNumber(2 * roundOff));
+        bounds.push_back({f, bound});
+    }
+    if (onlyCells && options.measure == ErrorMeasure::max)
+        throw InputError("cell fields jump from element to element, so their maximal error never falls below a bound: choose "
+                         "a point field, or --error-measure rms");
+    return bounds;
+}
+
+class ErrorRefinement {
+  public:
+    ErrorRefinement(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
+                    const RefineOptions& options, const Execution& execution)
+        : mesh_(mesh),
+          fields_(fields),
+          options_(options),
+          execution_(execution),
+          bound_(resampler.bind(mesh, fields)),
+          samples_(mesh, fields, execution),
+          nearest_(mesh, execution.threads),
+          bounds_(errorBounds(mesh, fields, samples_, options)),
+          plan_(mesh, chooseFrame(mesh, options), execution) {
+        plan_.placeOfSample = [this](std::uint32_t sample) {
+            return samples_.placeWorld(sample, plan_.frame().originWorld);
+        };
+        budgetLeaves_ = leafBudget(options, samples_.channels());
+        if (options.maxVoxels == 0 && options.maxMemoryBytes == 0)
+            budgetLeaves_ = std::min(budgetLeaves_, std::size_t(kDefaultErrorVoxels / brickPoints()));
+        if (plan_.leafCount() > budgetLeaves_)
+            throw InputError("the coarsest plan has " + std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +
+                             " voxels, more than the " + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) +
+                             " allowed");
+    }
+
+    BrickResult run();
+
+  private:
+    std::int64_t brickPoints() const {
+        const std::int64_t b = options_.brickCells;
+        return b * b * b;
+    }
+    void takeSamples();
+    void sampleNewLeaves();
+    void measureChanged();
+    std::vector<BrickKey> wanted(std::size_t limit) const;
+    bool refine();
+    double totalMeanSquare() const;
+    void addNodeWeights();
+    bool touchesFresh(std::size_t leaf) const;
+    double leafRatio(std::size_t leaf, const PlannedBrick& brick, LeafSampler& sampler) const;
+    ErrorReport report();
+    bool withinBound(const ErrorReport& report) const;
+    std::string whyStopped(const ErrorReport& report) const;
+
+    const TetMesh& mesh_;
+    std::span<const int> fields_;
+    const RefineOptions& options_;
+    const Execution& execution_;
+    std::unique_ptr<BoundResampler> bound_;
+    ErrorSamples samples_;
+    NearestPointIndex nearest_;
+    std::vector<FieldBound> bounds_;
+    BrickPlan plan_;
+    std::size_t budgetLeaves_ = 0;
+    std::vector<PlannedBrick*> leaves_;      // in the order of tree_.leaves()
+    std::vector<std::uint8_t> fresh_;        // sampled in this round
+    BrickTree tree_;
+    BrickStore store_;
+    std::vector<double> nodeWeight_;         // rms: share of the volume that a node stands for
+    double totalWeight_ = 0;
+    ResampleStatistics statistics_;
+    BrickTimes times_;
+    std::string stopped_;
+    int rounds_ = 0;
+};
+
+// Gives every sample to the root brick that it lies in.
+void ErrorRefinement::takeSamples() {
+    const BrickTree roots = plan_.tree();
+    const SamplesByLeaf sorted = sortSamples(samples_, roots, options_.boundsWorld, execution_);
+    for (PlannedBrick* brick : plan_.leaves()) {
+        const std::int64_t leaf = roots.findLeaf({0, brick->key.index});
+        const auto ids = sorted.of(std::size_t(leaf));
+        brick->samples.assign(ids.begin(), ids.end());
+    }
+}
+
+// Builds the tree of the leaves that stand now, keeps the samples there are and takes the missing ones.
+void ErrorRefinement::sampleNewLeaves() {
+    Timer timer;
+    tree_ = plan_.tree(options_.frame ? plan_.frame().maxDepth : -1);
+    const int finest = options_.frame ? plan_.frame().maxDepth : plan_.deepest();
+    leaves_.assign(tree_.leafCount(), nullptr);
+    for (PlannedBrick* brick : plan_.leaves())
+        leaves_[std::size_t(tree_.findLeaf({finest - brick->key.level, brick->key.index}))] = brick;
+    BrickStore next(tree_.brickCells(), tree_.leafCount(), samples_.channels());
+    std::vector<std::size_t> missing;
+    fresh_.assign(leaves_.size(), 0);
+    for (std::size_t i = 0; i < leaves_.size(); ++i) {
+        if (leaves_[i]->sampled) {
+            next.moveLeaf(i, store_, std::size_t(leaves_[i]->storeLeaf));
+        } else {
+            missing.push_back(i);
+            fresh_[i] = 1;
+        }
+        leaves_[i]->sampled = true;
+        leaves_[i]->storeLeaf = std::int64_t(i);
+    }
+    store_ = std::move(next);
+    times_.planMs += timer.restart();
+    resampleLeaves(tree_, missing, *bound_, store_, execution_, statistics_);
+    times_.resampleMs += timer.elapsedMs();
+}
+
+bool ErrorRefinement::touchesFresh(std::size_t leaf) const {
+    if (fresh_[leaf]) return true;
+    const BrickKey& key = tree_.leaves()[leaf];
+    for (int n = 0; n < 27; ++n) {
+        const BrickKey near{key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
+        const std::int64_t other = tree_.findCovering(near);
+        // Only a leaf whose coarser neighbour went away reads other values than before; a finer neighbour changes nothing here.
+        if (other >= 0 && fresh_[std::size_t(other)]) return true;
+    }
+    return false;
+}
+
+// max: the largest error over its bound. rms: the leaf's part of the mean square, over the bound's square.
+double ErrorRefinement::leafRatio(std::size_t leaf, const PlannedBrick& brick, LeafSampler& sampler) const {
+    if (brick.samples.empty()) return 0;
+    const bool rms = options_.measure == ErrorMeasure::rms;
+    sampler.enter(leaf);
+    std::vector<double> errors(samples_.fields().size());
+    std::vector<double> ratios(bounds_.size(), 0.0);
+    for (const std::uint32_t sample : brick.samples) {
+        sampler.measure(sample, errors);
+        for (std::size_t i = 0; i < bounds_.size(); ++i) {
+            const double error = errors[bounds_[i].field] / bounds_[i].bound;
+            if (!(error >= 0)) continue;
+            if (!rms) {
+                ratios[i] = std::max(ratios[i], error);
+                continue;
+            }
+            const bool isNode = sample < samples_.nodeCount();
+            double weight = 0;
+            if (isNode)
+                weight = nodeWeight_[sample];
+            else
+                weight = samples_.volumeWorld(sample - samples_.nodeCount()) *
+                         (samples_.fields()[bounds_[i].field].isCell() ? 1.0 : 0.8);
+            ratios[i] += weight / totalWeight_ * error * error;
+        }
+    }
+    return ratios.empty() ? 0 : *std::max_element(ratios.begin(), ratios.end());
+}
+
+void ErrorRefinement::measureChanged() {
+    Timer timer;
+    const Reconstruction reconstruction(mesh_, fields_, tree_, store_, nearest_);
+    constexpr std::int64_t kChunk = 16;
+    parallelForChunks(execution_, std::int64_t(leaves_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        LeafSampler sampler(samples_, tree_, store_, reconstruction);
+        for (std::int64_t i = begin; i < end; ++i)
+            if (touchesFresh(std::size_t(i)))
+                leaves_[std::size_t(i)]->ratio = leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
+    });
+    times_.verifyMs += timer.elapsedMs();
+}
+
+void ErrorRefinement::addNodeWeights() {
+    nodeWeight_.assign(samples_.nodeCount(), 0.0);
+    for (std::size_t e = 0; e < mesh_.tets.size(); ++e) {
+        const double volume = samples_.volumeWorld(e);
+        totalWeight_ += volume;
+        for (const std::int32_t node : mesh_.tets[e]) nodeWeight_[std::size_t(node)] += volume / 20;
+    }
+}
+
+// An upper estimate over the fields: each leaf counts with its worst field.
+double ErrorRefinement::totalMeanSquare() const {
+    double sum = 0;
+    for (const PlannedBrick* leaf : leaves_) sum += leaf->ratio;
+    return sum;
+}
+
+// Leaves to split, the worst first, at most `limit`.
+std::vector<BrickKey> ErrorRefinement::wanted(std::size_t limit) const {
+    std::vector<const PlannedBrick*> worst;
+    const bool rms = options_.measure == ErrorMeasure::rms;
+    const int maxDepth = plan_.frame().maxDepth;
+    for (const PlannedBrick* leaf : leaves_)
+        if (leaf->key.level < maxDepth && leaf->ratio > (rms ? 0.0 : 1.0)) worst.push_back(leaf);
+    std::stable_sort(worst.begin(), worst.end(),
+                     [](const PlannedBrick* a, const PlannedBrick* b) { return a->ratio > b->ratio; });
+    if (rms) {
+        // Those that hold half of what is above the bound: splitting takes most of a leaf's error away.
+        const double total = totalMeanSquare();
+        double sum = 0;
+        std::size_t count = 0;
+        while (count < worst.size() && sum < std::max(0.5 * (total - 1), 0.02 * total)) sum += worst[count++]->ratio;
+        worst.resize(total > 1 ? count : 0);
+    }
+    if (worst.size() > limit) worst.resize(limit);
+    std::vector<BrickKey> keys;
+    for (const PlannedBrick* leaf : worst) keys.push_back(leaf->key);
+    return keys;
+}
+
+// One round. False when nothing is left to split, or no split fits the budget.
+bool ErrorRefinement::refine() {
+    Timer timer;
+    std::vector<BrickKey> keys = wanted(std::numeric_limits<std::size_t>::max());
+    const bool any = !keys.empty();
+    bool done = false;
+    while (!keys.empty() && !(done = plan_.split(keys, budgetLeaves_, execution_))) {
+        stopped_ = "the bound on voxels (" + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + ")";
+        keys.resize(keys.size() / 2);
+    }
+    times_.planMs += timer.elapsedMs();
+    if (!any && stopped_.empty() && std::any_of(leaves_.begin(), leaves_.end(), [](const PlannedBrick* leaf) {
+            return leaf->ratio > 1;
+        }))
+        stopped_ = "the finest spacing allowed (" + shortNumber(plan_.frame().spacingWorld(plan_.frame().maxDepth)) + ")";
+    return done;
+}
+
+bool ErrorRefinement::withinBound(const ErrorReport& report) const {
+    return std::all_of(bounds_.begin(), bounds_.end(), [&](const FieldBound& b) {
+        const FieldError& error = report.fields[b.field];
+        return (options_.measure == ErrorMeasure::rms ? error.rms : error.max) <= b.bound;
+    });
+}
+
+std::string ErrorRefinement::whyStopped(const ErrorReport& report) const {
+    const FieldBound* worst = nullptr;
+    double ratio = 0;
+    for (const FieldBound& b : bounds_) {
+        const FieldError& error = report.fields[b.field];
+        const double r = (options_.measure == ErrorMeasure::rms ? error.rms : error.max) / b.bound;
+        if (r > ratio) ratio = r, worst = &b;
+    }
+    const FieldError& error = report.fields[worst->field];
+    const double reached = options_.measure == ErrorMeasure::rms ? error.rms : error.max;
+    return (stopped_.empty() ? std::string("no brick left to split") : stopped_) + " ended the refinement at " +
+           (options_.measure == ErrorMeasure::rms ? "an RMS" : "a largest") + " error of " + shortNumber(reached) +
+           " in " + error.name + " (bound " + shortNumber(worst->bound) + "); the worst spot is " +
+           placeText(error.worstPlaceWorld);
+}
+
+ErrorReport ErrorRefinement::report() {
+    Timer timer;
+    MeasureOptions measure;
+    measure.boundsWorld = options_.boundsWorld;
+    measure.samples = &samples_;
+    ErrorReport result = measureError(mesh_, fields_, tree_, store_, nearest_, execution_, measure);
+    times_.verifyMs += timer.elapsedMs();
+    return result;
+}
+
+BrickResult ErrorRefinement::run() {
+    Timer timer;
+    if (options_.measure == ErrorMeasure::rms) addNodeWeights();
+    takeSamples();
+    times_.planMs += timer.elapsedMs();
+    BrickResult result;
+    for (;;) {
+        execution_.throwIfCancelled();
+        sampleNewLeaves();
+        measureChanged();
+        ++rounds_;
+        if (refine()) continue;
+        result.report = report();
+        result.bounded = withinBound(result.report);
+        if (result.bounded || !stopped_.empty()) break;
+        // A coarse corner's value can change through a chain of level borders, beyond the neighbours that were measured again.
+        std::fill(fresh_.begin(), fresh_.end(), std::uint8_t(1));
+        measureChanged();
+        if (!refine()) break;
+    }
+    if (!result.bounded) result.stoppedBecause = whyStopped(result.report);
+    result.tree = std::move(tree_);
+    result.store = std::move(store_);
+    result.statistics = statistics_;
+    result.times = times_;
+    result.rounds = rounds_;
+    return result;
+}
+
+}  // namespace
+
+BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
+                              const RefineOptions& options, const Execution& execution) {
+    checkOptions(mesh, options);
+    Timer timer;
+    if (options.criterion == Criterion::error) {
+        ErrorRefinement refinement(mesh, fields, resampler, options, execution);
+        const double setupMs = timer.elapsedMs();
+        BrickResult result = refinement.run();
+        result.times.planMs += setupMs;
+        return result;
+    }
+    BrickResult result;
+    int channels = 0;
+    for (const int f : fields) channels += mesh.fields[std::size_t(f)].components;
+    result.tree = planBricks(mesh, options, execution, channels, &result.notes);
+    result.times.planMs = timer.restart();
+    const auto bound = resampler.bind(mesh, fields);
+    result.store = resampleTree(result.tree, *bound, channels, execution, result.statistics);
+    result.times.resampleMs = timer.restart();
+    const NearestPointIndex nearest(mesh, execution.threads);
+    MeasureOptions measure;
+    measure.boundsWorld = options.boundsWorld;
+    result.report = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);
+    result.times.verifyMs = timer.elapsedMs();
+    return result;
+}
+
+}  // namespace tessera

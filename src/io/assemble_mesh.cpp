@@ -1,0 +1,291 @@
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "base/error.h"
+#include "io/raw_mesh.h"
+#include "mesh/mesh_quality.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::int64_t kChunk = 1 << 15;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+std::string coordinateText(const Vec3d& p) {
+    return "(" + std::to_string(p.x) + ", " + std::to_string(p.y) + ", " + std::to_string(p.z) + ")";
+}
+
+/// Calls visit(node) for every node index of a cell; a polyhedron's stream has counts between them.
+template <class Nodes, class Visit>
+void forEachNode(CellKind kind, Nodes nodes, std::int64_t count, const Visit& visit) {
+    if (kind != CellKind::polyhedron) {
+        for (std::int64_t i = 0; i < count; ++i) visit(nodes[i]);
+        return;
+    }
+    std::int64_t at = 1;
+    for (std::int32_t f = 0; f < nodes[0]; ++f) {
+        const std::int64_t faceNodes = nodes[at++];
+        for (std::int64_t i = 0; i < faceNodes; ++i) visit(nodes[at++]);
+    }
+}
+
+template <class Visit>
+void forEachNode(CellList& cells, const Execution& execution, const Visit& visit) {
+    parallelForChunks(execution, cells.cellCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t c = begin; c < end; ++c) {
+            const std::int64_t first = cells.begin[std::size_t(c)];
+            forEachNode(cells.kinds[std::size_t(c)], cells.nodes.data() + first,
+                        cells.begin[std::size_t(c) + 1] - first, visit);
+        }
+    });
+}
+
+/// Drops the nodes that no cell uses and renumbers. Returns the old index of every node that stays; empty when all do.
+std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& block, std::size_t blockIndex,
+                                          std::size_t blockCount, const Execution& execution) {
+    std::vector<std::int32_t> newIndex(block.points.size(), -1);
+    forEachNode(block.cells, execution, [&](std::int32_t node) {
+        std::atomic_ref(newIndex[std::size_t(node)]).store(0, std::memory_order_relaxed);
+    });
+    std::vector<std::int32_t> kept;
+    kept.reserve(block.points.size());
+    for (std::size_t i = 0; i < newIndex.size(); ++i) {
+        if (newIndex[i] < 0) continue;
+        const Vec3d& p = block.points[i];
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            throw InputError(path + ": node " + std::to_string(i) + " (counted from 0)" +
+                             (blockCount > 1 ? " of block " + std::to_string(blockIndex) : "") +
+                             " has a coordinate that isn't finite: " + coordinateText(p));
+        newIndex[i] = std::int32_t(kept.size());
+        kept.push_back(std::int32_t(i));
+    }
+    if (kept.size() == block.points.size()) return {};
+    forEachNode(block.cells, execution, [&](std::int32_t& node) { node = newIndex[std::size_t(node)]; });
+    std::vector<Vec3d> points(kept.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) points[i] = block.points[std::size_t(kept[i])];
+    block.points = std::move(points);
+    return kept;
+}
+
+/// Keeps the tuples of the chosen items, in this order.
+template <class Index>
+void gatherTuples(Field& field, const std::vector<Index>& items, const Execution& execution) {
+    const auto components = std::size_t(field.components);
+    std::vector<double> values(items.size() * components);
+    parallelForChunks(execution, std::int64_t(items.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        for (auto i = std::size_t(begin); i < std::size_t(end); ++i)
+            for (std::size_t c = 0; c < components; ++c)
+                values[i * components + c] = field.values[std::size_t(items[i]) * components + c];
+    });
+    field.values = std::move(values);
+}
+
+/// One block with points, cells and fields of all; cell fields have one tuple for every listed cell.
+RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& execution) {
+    std::size_t points = 0, cells = 0;
+    for (std::size_t b = 0; b < raw.blocks.size(); ++b) {
+        RawBlock& block = raw.blocks[b];
+        const std::vector<std::int32_t> kept = dropUnusedNodes(path, block, b, raw.blocks.size(), execution);
+        for (Field& field : block.fields) {
+            if (field.location == FieldLocation::point && !kept.empty())
+                gatherTuples(field, kept, execution);
+            else if (field.location == FieldLocation::point && block.points.empty())
+                field.values.clear();
+            else if (field.location == FieldLocation::cell && !block.sourceCell.empty())
+                gatherTuples(field, block.sourceCell, execution);
+        }
+        points += block.points.size();
+        cells += block.cells.kinds.size();
+    }
+    if (points > std::size_t(std::numeric_limits<std::int32_t>::max()))
+        throw InputError(path + ": has " + std::to_string(points) + " nodes; at most 2147483647 are possible");
+    if (raw.blocks.size() == 1) return std::move(raw.blocks[0]);
+
+    RawBlock all;
+    std::map<std::pair<FieldLocation, std::string>, std::size_t> fieldOf;
+    std::set<std::pair<FieldLocation, std::string>> partial;
+    std::size_t pointBase = 0, cellBase = 0;
+    for (RawBlock& block : raw.blocks) {
+        forEachNode(block.cells, execution, [&](std::int32_t& node) { node += std::int32_t(pointBase); });
+        all.points.insert(all.points.end(), block.points.begin(), block.points.end());
+        all.cells.kinds.insert(all.cells.kinds.end(), block.cells.kinds.begin(), block.cells.kinds.end());
+        const auto nodeBase = std::int64_t(all.cells.nodes.size());
+        for (std::size_t c = 1; c < block.cells.begin.size(); ++c)
+            all.cells.begin.push_back(block.cells.begin[c] + nodeBase);
+        all.cells.nodes.insert(all.cells.nodes.end(), block.cells.nodes.begin(), block.cells.nodes.end());
+        all.arrays.insert(all.arrays.end(), block.arrays.begin(), block.arrays.end());
+        std::set<std::size_t> seen;
+        for (Field& field : block.fields) {
+            const bool atPoints = field.location == FieldLocation::point;
+            const auto key = std::pair(field.location, field.name);
+            auto place = fieldOf.find(key);
+            if (place == fieldOf.end()) {
+                place = fieldOf.emplace(key, all.fields.size()).first;
+                all.fields.push_back({field.name, field.location, field.components, {}});
+                all.fields.back().values.assign((atPoints ? points : cells) * std::size_t(field.components), kNan);
+                if ((atPoints ? pointBase : cellBase) > 0) partial.insert(key);
+            }
+            Field& target = all.fields[place->second];
+            if (target.components != field.components) continue;
+            seen.insert(place->second);
+            const std::size_t base = (atPoints ? pointBase : cellBase) * std::size_t(field.components);
+            std::copy(field.values.begin(), field.values.end(), target.values.begin() + std::ptrdiff_t(base));
+        }
+        if (!block.cells.kinds.empty())
+            for (const auto& [key, index] : fieldOf)
+                if (!seen.contains(index)) partial.insert(key);
+        pointBase += block.points.size();
+        cellBase += block.cells.kinds.size();
+        block = {};
+    }
+    for (const auto& [location, name] : partial)
+        raw.statistics.warnings.push_back("Field '" + name + "' is absent in some blocks or has another number of " +
+                                          "components there; its values are NaN in these.");
+    return all;
+}
+
+/// Gives a cell field another name when a point field has the same, so that names are unique.
+void renameTwins(RawBlock& block, ImportStatistics& statistics) {
+    std::set<std::string> pointNames;
+    for (const ArrayInfo& array : block.arrays)
+        if (array.location == FieldLocation::point) pointNames.insert(array.name);
+    for (Field& field : block.fields) {
+        if (field.location != FieldLocation::cell || !pointNames.contains(field.name)) continue;
+        const std::string name = cellFieldName(field.name);
+        statistics.warnings.push_back("Both points and cells have a field '" + field.name + "'; that of the cells is called '" +
+                                      name + "'.");
+        field.name = name;
+    }
+    for (ArrayInfo& array : block.arrays)
+        if (array.location == FieldLocation::cell && pointNames.contains(array.name))
+            array.name = cellFieldName(array.name);
+}
+
+void selectFields(const std::string& path, RawBlock& block, const ReadOptions& options) {
+    std::set<std::string> available;
+    std::set<std::string> other;
+    for (const ArrayInfo& array : block.arrays) (array.numeric ? available : other).insert(array.name);
+    for (const std::string& name : options.fields) {
+        if (available.contains(name)) continue;
+        if (other.contains(name)) throw InputError(path + ": field '" + name + "' isn't numeric");
+        std::string list;
+        for (const std::string& there : available) list += (list.empty() ? "" : ", ") + there;
+        throw InputError(path + ": there is no field '" + name + "'; there are: " + (list.empty() ? "none" : list));
+    }
+    for (const ArrayInfo& array : block.arrays)
+        if (array.components > 9 &&
+            std::find(options.fields.begin(), options.fields.end(), array.name) != options.fields.end())
+            throw InputError(path + ": field '" + array.name + "' has " + std::to_string(array.components) +
+                             " components; fields have 1 to 9");
+    if (options.fields.empty()) return;
+    std::erase_if(block.fields, [&](const Field& field) {
+        return std::find(options.fields.begin(), options.fields.end(), field.name) == options.fields.end();
+    });
+}
+
+void warnSkippedArrays(const RawBlock& block, ImportStatistics& statistics) {
+    std::set<std::string> wide, text;
+    for (const ArrayInfo& array : block.arrays) {
+        if (!array.numeric)
+            text.insert(array.name);
+        else if (array.components > 9 || array.components < 1)
+            wide.insert(array.name);
+    }
+    for (const std::string& name : wide)
+        statistics.warnings.push_back("Field '" + name + "' is left out: fields have 1 to 9 components.");
+    for (const std::string& name : text)
+        statistics.warnings.push_back("Field '" + name + "' is left out: it isn't numeric.");
+}
+
+/// Appends the means for added nodes to a point field.
+void extendPointField(Field& field, const std::vector<AddedNode>& added) {
+    for (const AddedNode& node : added) {
+        for (int c = 0; c < field.components; ++c) {
+            double sum = 0;
+            for (const std::int32_t parent : node.parents) sum += field.at(parent, c);
+            field.values.push_back(sum / double(node.parents.size()));
+        }
+    }
+}
+
+void fillStatistics(const TetMesh& mesh, ImportStatistics& statistics, const Execution& execution) {
+    const MeshQuality quality = measureQuality(mesh, execution);
+    statistics.nodes = mesh.nodeCount();
+    statistics.elements = mesh.elementCount();
+    statistics.flat = quality.flat;
+    statistics.inverted = quality.inverted;
+    statistics.duplicate = quality.duplicate;
+    statistics.coincidentNodes = quality.coincidentNodes;
+    statistics.boundaryFaces = quality.boundaryFaces;
+    statistics.nonConformingFaces = quality.nonConformingFaces;
+    statistics.smallestEdgeWorld = quality.smallestEdgeWorld;
+    statistics.largestEdgeWorld = quality.largestEdgeWorld;
+    statistics.smallestVolumeWorld = quality.smallestVolumeWorld;
+    statistics.largestVolumeWorld = quality.largestVolumeWorld;
+}
+
+bool isPureTets(const CellList& cells) {
+    return std::all_of(cells.kinds.begin(), cells.kinds.end(), [](CellKind kind) { return kind == CellKind::tet; });
+}
+
+}  // namespace
+
+std::string cellFieldName(const std::string& name) { return name + "_cell"; }
+
+bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location) {
+    if (options.fields.empty()) return true;
+    const auto asked = [&](const std::string& n) {
+        return std::find(options.fields.begin(), options.fields.end(), n) != options.fields.end();
+    };
+    return asked(name) || (location == FieldLocation::cell && asked(cellFieldName(name)));
+}
+
+MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options, const Execution& execution) {
+    ImportStatistics& statistics = raw.statistics;
+    statistics.blocks = std::int64_t(raw.blocks.size());
+    statistics.cells = 0;
+    for (const RawBlock& block : raw.blocks) statistics.cells += block.cells.cellCount();
+    if (statistics.cells == 0)
+        throw InputError(path + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
+                         " others: points, lines, surfaces or unknown; " + std::to_string(statistics.blankedCells) +
+                         " blanked or ghost cells)");
+    if (statistics.higherOrderCells > 0)
+        statistics.warnings.push_back(std::to_string(statistics.higherOrderCells) + " of " +
+                                      std::to_string(statistics.cells) +
+                                      " cells are of higher order; they are read by their corner nodes only, as linear cells.");
+    RawBlock block = mergeBlocks(path, raw, execution);
+    renameTwins(block, statistics);
+    selectFields(path, block, options);
+    warnSkippedArrays(block, statistics);
+
+    MeshFile file;
+    const bool pureTets = isPureTets(block.cells);
+    SplitCells split = splitCells(block.points, block.cells, execution);
+    if (std::int64_t(split.tets.size()) >= (std::int64_t(1) << 30))
+        throw InputError(path + ": gives " + std::to_string(split.tets.size()) + " tetrahedra; fewer than 2^30 are possible");
+    file.mesh.points = std::move(block.points);
+    for (const AddedNode& node : split.addedNodes) file.mesh.points.push_back(node.point);
+    statistics.addedNodes = std::int64_t(split.addedNodes.size());
+    const bool everyCellIsItsTet = pureTets && split.tets.size() == block.cells.kinds.size();
+    for (Field& field : block.fields) {
+        if (field.location == FieldLocation::point)
+            extendPointField(field, split.addedNodes);
+        else if (!everyCellIsItsTet)
+            gatherTuples(field, split.sourceCell, execution);
+        file.mesh.fields.push_back(std::move(field));
+    }
+    file.mesh.tets = std::move(split.tets);
+    if (file.mesh.tets.empty())
+        throw InputError(path + ": all cells are collapsed: none has four different nodes that span a tetrahedron");
+    fillStatistics(file.mesh, statistics, execution);
+    file.statistics = std::move(statistics);
+    return file;
+}
+
+}  // namespace tessera

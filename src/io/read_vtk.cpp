@@ -1,0 +1,234 @@
+#include "io/read_vtk.h"
+
+#include <vtkAlgorithm.h>
+#include <vtkCGNSReader.h>
+#include <vtkDataArraySelection.h>
+#include <vtkDataObject.h>
+#include <vtkDataSetReader.h>
+#include <vtkExodusIIReader.h>
+#include <vtkGenericEnSightReader.h>
+#include <vtkInformation.h>
+#include <vtkNew.h>
+#include <vtkOpenFOAMReader.h>
+#include <vtkSmartPointer.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLMultiBlockDataReader.h>
+#include <vtkXMLPImageDataReader.h>
+#include <vtkXMLPRectilinearGridReader.h>
+#include <vtkXMLPStructuredGridReader.h>
+#include <vtkXMLPUnstructuredGridReader.h>
+#include <vtkXMLRectilinearGridReader.h>
+#include <vtkXMLStructuredGridReader.h>
+#include <vtkXMLUnstructuredGridReader.h>
+
+#include <new>
+
+#include "base/error.h"
+#include "io/vtk_convert.h"
+#include "io/vtk_messages.h"
+#include "io/xml_check.h"
+
+namespace tessera {
+
+namespace {
+
+struct XmlReaderKind {
+    const char* type;          // attribute of <VTKFile>
+    const char* description;   // for the user
+    vtkSmartPointer<vtkXMLReader> (*make)();
+};
+
+template <class Reader>
+vtkSmartPointer<vtkXMLReader> makeXmlReader() {
+    return vtkSmartPointer<Reader>::New();
+}
+
+const XmlReaderKind kXmlReaders[] = {
+    {"UnstructuredGrid", "VTK XML unstructured grid", makeXmlReader<vtkXMLUnstructuredGridReader>},
+    {"PUnstructuredGrid", "VTK XML parallel unstructured grid", makeXmlReader<vtkXMLPUnstructuredGridReader>},
+    {"StructuredGrid", "VTK XML structured grid", makeXmlReader<vtkXMLStructuredGridReader>},
+    {"PStructuredGrid", "VTK XML parallel structured grid", makeXmlReader<vtkXMLPStructuredGridReader>},
+    {"RectilinearGrid", "VTK XML rectilinear grid", makeXmlReader<vtkXMLRectilinearGridReader>},
+    {"PRectilinearGrid", "VTK XML parallel rectilinear grid", makeXmlReader<vtkXMLPRectilinearGridReader>},
+    {"ImageData", "VTK XML image data", makeXmlReader<vtkXMLImageDataReader>},
+    {"PImageData", "VTK XML parallel image data", makeXmlReader<vtkXMLPImageDataReader>},
+    {"vtkMultiBlockDataSet", "VTK XML multi-block", makeXmlReader<vtkXMLMultiBlockDataReader>},
+};
+
+/// A reader ready to run, and what it reads.
+struct OpenReader {
+    vtkSmartPointer<vtkAlgorithm> reader;
+    std::string format;
+};
+
+/// Leaves out arrays that nobody asked for. Their names stay known, for messages.
+void selectArrays(vtkDataArraySelection* selection, FieldLocation location, const ReadOptions& options,
+                  std::vector<ArrayInfo>& unread) {
+    if (!selection || options.fields.empty()) return;
+    for (int a = 0; a < selection->GetNumberOfArrays(); ++a) {
+        const std::string name = selection->GetArrayName(a) ? selection->GetArrayName(a) : "";
+        if (name.empty() || name.starts_with("vtk") || isWanted(options, name, location)) continue;
+        selection->DisableArray(name.c_str());
+        unread.push_back({name, location, 1, true});
+    }
+}
+
+OpenReader openXml(const std::string& path, const XmlFileInfo& info) {
+    for (const XmlReaderKind& kind : kXmlReaders) {
+        if (info.type != kind.type) continue;
+        auto reader = kind.make();
+        reader->SetFileName(path.c_str());
+        return {reader, kind.description};
+    }
+    throw InputError(path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
+                     (info.type == "Collection" ? "; name one of its files, or resample the .pvd as a series" : ""));
+}
+
+OpenReader openExodus(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
+    reader->SetFileName(path.c_str());
+    // Coordinates as they are in the file, and no bookkeeping arrays.
+    reader->ApplyDisplacementsOff();
+    reader->GenerateObjectIdCellArrayOff();
+    reader->GenerateGlobalElementIdArrayOff();
+    reader->GenerateGlobalNodeIdArrayOff();
+    reader->UpdateInformation();
+    reader->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
+    reader->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
+    return {reader, "Exodus II"};
+}
+
+OpenReader openCgns(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkCGNSReader>::New();
+    reader->SetFileName(path.c_str());
+    reader->SetDoublePrecisionMesh(1);
+    reader->SetLoadBndPatch(false);
+    reader->UpdateInformation();
+    reader->EnableAllBases();
+    reader->EnableAllFamilies();
+    reader->EnableAllPointArrays();
+    reader->EnableAllCellArrays();
+    return {reader, "CGNS"};
+}
+
+OpenReader openEnSight(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
+    reader->SetCaseFileName(path.c_str());
+    reader->ReadAllVariablesOn();
+    return {reader, "EnSight"};
+}
+
+OpenReader openFoam(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
+    reader->SetFileName(path.c_str());
+    reader->DecomposePolyhedraOff();
+    reader->CreateCellToPointOff();
+    reader->UpdateInformation();
+    reader->EnableAllCellArrays();
+    reader->EnableAllPointArrays();
+    reader->DisableAllLagrangianArrays();
+    reader->DisableAllPatchArrays();
+    reader->SetPatchArrayStatus("internalMesh", 1);
+    return {reader, "OpenFOAM"};
+}
+
+OpenReader openLegacy(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkDataSetReader>::New();
+    reader->SetFileName(path.c_str());
+    reader->ReadAllScalarsOn();
+    reader->ReadAllVectorsOn();
+    reader->ReadAllNormalsOn();
+    reader->ReadAllTensorsOn();
+    reader->ReadAllColorScalarsOn();
+    reader->ReadAllTCoordsOn();
+    reader->ReadAllFieldsOn();
+    return {reader, "VTK legacy"};
+}
+
+OpenReader open(const std::string& path, VtkFormat format, const XmlFileInfo& info) {
+    switch (format) {
+        case VtkFormat::xml: return openXml(path, info);
+        case VtkFormat::legacy: return openLegacy(path);
+        case VtkFormat::exodus: return openExodus(path);
+        case VtkFormat::cgns: return openCgns(path);
+        case VtkFormat::ensight: return openEnSight(path);
+        case VtkFormat::openfoam: break;
+    }
+    return openFoam(path);
+}
+
+/// Runs the reader for the time step that the options choose.
+void update(const std::string& path, vtkAlgorithm* reader, const ReadOptions& options) {
+    reader->UpdateInformation();
+    vtkInformation* information = reader->GetOutputInformation(0);
+    const int steps = information && information->Has(vtkStreamingDemandDrivenPipeline::TIME_STEPS())
+                          ? information->Length(vtkStreamingDemandDrivenPipeline::TIME_STEPS())
+                          : 0;
+    if (options.timeStep >= std::max(steps, 1))
+        throw InputError(path + ": there is no time step " + std::to_string(options.timeStep) + "; it has " +
+                         std::to_string(std::max(steps, 1)) + ", counted from 0");
+    if (steps == 0) {
+        reader->Update();
+        return;
+    }
+    const double* times = information->Get(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
+    reader->UpdateTimeStep(times[options.timeStep < 0 ? steps - 1 : options.timeStep]);
+}
+
+void throwOnErrors(const std::string& path, const VtkMessages& messages) {
+    const std::vector<std::string> errors = messages.errors();
+    if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
+}
+
+void checkCounts(const std::string& path, const XmlFileInfo& info, vtkDataObject* data) {
+    if (info.type != "UnstructuredGrid") return;
+    const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
+    const auto cells = std::int64_t(data->GetNumberOfElements(vtkDataObject::CELL));
+    if (points != info.points || cells != info.cells)
+        throw InputError(path + ": damaged or cut off: it declares " + std::to_string(info.points) + " points and " +
+                         std::to_string(info.cells) + " cells, " + std::to_string(points) + " and " +
+                         std::to_string(cells) + " could be read");
+}
+
+RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options, const Execution& execution) {
+    RawMesh raw;
+    XmlFileInfo info;
+    if (format == VtkFormat::xml) info = checkXmlFile(path);
+    if (format == VtkFormat::legacy) checkLegacyFile(path);
+    const VtkMessages messages;
+    OpenReader opened = open(path, format, info);
+    std::vector<ArrayInfo> unread;
+    if (auto* xml = vtkXMLReader::SafeDownCast(opened.reader)) {
+        xml->UpdateInformation();
+        selectArrays(xml->GetPointDataArraySelection(), FieldLocation::point, options, unread);
+        selectArrays(xml->GetCellDataArraySelection(), FieldLocation::cell, options, unread);
+    }
+    throwOnErrors(path, messages);
+    update(path, opened.reader, options);
+    throwOnErrors(path, messages);
+    vtkDataObject* data = opened.reader->GetOutputDataObject(0);
+    if (!data) throw InputError(path + ": could not be read as " + opened.format);
+    if (format == VtkFormat::xml) checkCounts(path, info, data);
+    raw.statistics.format = opened.format;
+    appendVtkData(path, data, options, execution, raw);
+    throwOnErrors(path, messages);
+    for (const std::string& warning : messages.warnings()) raw.statistics.warnings.push_back("VTK: " + warning);
+    if (!raw.blocks.empty())
+        raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
+    return raw;
+}
+
+}  // namespace
+
+RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options, const Execution& execution) {
+    try {
+        return read(path, format, options, execution);
+    } catch (const std::bad_alloc&) {
+        throw InputError(path + ": damaged or too large: reading it asked for more memory than there is");
+    } catch (const std::length_error&) {
+        throw InputError(path + ": damaged: it declares an impossible size");
+    }
+}
+
+}  // namespace tessera

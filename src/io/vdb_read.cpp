@@ -1,0 +1,275 @@
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <new>
+
+#include "base/error.h"
+#include "io/file_digest.h"
+#include "io/vdb_metadata.h"
+
+namespace tessera {
+namespace {
+
+constexpr std::size_t kUuidOffset = 21;
+constexpr std::size_t kUuidBytes = 36;
+constexpr std::size_t kHeaderBytes = kUuidOffset + kUuidBytes;
+constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) { throw InputError(path + ": " + why); }
+
+// Whether the bytes are those that a Tessera wrote. Throws when they claim to be but aren't.
+bool checkBytes(const std::string& path) {
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) refuse(path, std::string("can't open it: ") + std::strerror(errno));
+    std::vector<char> bytes(std::size_t(1) << 20);
+    stream.read(bytes.data(), std::streamsize(bytes.size()));
+    std::size_t got = std::size_t(stream.gcount());
+    if (got == 0) refuse(path, "the file is empty, or not a file");
+    if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) refuse(path, "not a VDB file");
+    const std::string uuid(bytes.data() + kUuidOffset, kUuidBytes);
+    if (!isDigestUuid(uuid)) return false;
+    std::memset(bytes.data() + kUuidOffset, '0', kUuidBytes);
+    FileDigest digest;
+    while (got > 0) {
+        digest.update(bytes.data(), got);
+        stream.read(bytes.data(), std::streamsize(bytes.size()));
+        got = std::size_t(stream.gcount());
+    }
+    if (digest.uuid() != uuid) refuse(path, "the file is damaged or incomplete: its bytes don't match its digest");
+    return true;
+}
+
+// OpenVDB trusts what it reads, so a damaged file can end the process. A file that no digest vouches for is read in a child first, which may die.
+template <class Read>
+void tryInChild(const std::string& path, const Read& read) {
+    const pid_t child = ::fork();
+    if (child < 0) throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
+    if (child == 0) {
+        const rlimit noCore{0, 0};
+        ::setrlimit(RLIMIT_CORE, &noCore);
+        const rlimit seconds{300, 300};
+        ::setrlimit(RLIMIT_CPU, &seconds);
+        for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) ::signal(signal, SIG_DFL);
+        // An exception is reported by the parent, which gets the same one.
+        try {
+            read();
+        } catch (...) {
+        }
+        ::_exit(0);
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (!WIFEXITED(status)) refuse(path, "the file is damaged: OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it");
+}
+
+template <class Read>
+auto guarded(const std::string& path, const Read& read) {
+    try {
+        if (!checkBytes(path)) tryInChild(path, read);
+        return read();
+    } catch (const openvdb::Exception& error) {
+        refuse(path, std::string("OpenVDB can't read it: ") + error.what());
+    } catch (const InputError&) {
+        throw;
+    } catch (const IoError&) {
+        throw;
+    } catch (const InternalError&) {
+        throw;
+    } catch (const std::exception& error) {
+        refuse(path, std::string("the file is damaged: ") + error.what());
+    }
+}
+
+std::map<std::string, std::string> textEntries(const openvdb::MetaMap& metadata) {
+    std::map<std::string, std::string> entries;
+    for (auto it = metadata.beginMeta(); it != metadata.endMeta(); ++it) {
+        if (it->second && it->second->typeName() == openvdb::StringMetadata::staticTypeName()) entries[it->first] = it->second->str();
+    }
+    return entries;
+}
+
+template <class Grid>
+typename Grid::Ptr readTypedGrid(openvdb::io::File& file, const std::string& name) {
+    if (!file.hasGrid(name)) throw InputError("there is no grid " + name);
+    const typename Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
+    if (!grid) throw InputError("grid " + name + " is not a " + Grid::gridType());
+    return grid;
+}
+
+// Calls visit(leaf, tile position in the leaf, lattice index of its first point) for every tile of one level.
+template <class Visit>
+void forEachTilePlace(const BrickTree& tree, int tilesPerEdge, int level, const Visit& visit) {
+    for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+        const BrickKey& key = tree.leaves()[leaf];
+        if (key.level != level) continue;
+        const Vec3i first = tree.ownedPoints(key).min;
+        int tile = 0;
+        for (int x = 0; x < tilesPerEdge; ++x)
+            for (int y = 0; y < tilesPerEdge; ++y)
+                for (int z = 0; z < tilesPerEdge; ++z, ++tile) visit(leaf, tile, first + Vec3i(x, y, z) * kTileSize);
+    }
+}
+
+openvdb::Coord pointOf(const Vec3i& origin, int offset) {
+    return {origin.x + (offset >> 6), origin.y + (offset >> 3 & 7), origin.z + (offset & 7)};
+}
+
+void readCoverage(const openvdb::BoolGrid& grid, int level, VdbFile& file) {
+    openvdb::BoolGrid::ConstAccessor accessor = grid.getConstAccessor();
+    std::uint64_t found = 0;
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level, [&](std::size_t leaf, int tile, const Vec3i& origin) {
+        std::array<std::uint64_t, 8> words{};
+        const openvdb::Coord first = pointOf(origin, 0);
+        if (const auto* node = accessor.probeConstLeaf(first)) {
+            for (openvdb::Index w = 0; w < 8; ++w) words[w] = node->getValueMask().getWord<openvdb::Index64>(w);
+        } else if (accessor.isValueOn(first)) {
+            // Another program merged the leaf node into a tile of its parent.
+            words.fill(~std::uint64_t(0));
+        }
+        std::uint64_t count = 0;
+        for (std::uint64_t word : words) count += std::uint64_t(std::popcount(word));
+        if (count > 0) file.store.ensureTile(leaf, tile).coverage = words;
+        found += count;
+    });
+    if (found != grid.activeVoxelCount()) throw InputError("grid " + grid.getName() + " covers points outside the bricks of its level");
+}
+
+// Undoes the turn of the axes that the writer made.
+openvdb::Vec3f turnedBack(const openvdb::Vec3f& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return {v.x(), -v.z(), v.y()};
+    if (upAxis == UpAxis::z) return {v.x(), v.z(), -v.y()};
+    return v;
+}
+
+template <class Grid, class Put>
+void readValues(const Grid& grid, int level, VdbFile& file, const Put& put) {
+    typename Grid::ConstAccessor accessor = grid.getConstAccessor();
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level, [&](std::size_t leaf, int tile, const Vec3i& origin) {
+        Tile* stored = file.store.tile(leaf, tile);
+        if (!stored) return;
+        for (int offset = 0; offset < kTilePoints; ++offset) {
+            if (!stored->covered(offset)) continue;
+            typename Grid::ValueType value;
+            const bool valid = accessor.probeValue(pointOf(origin, offset), value);
+            put(*stored, offset, valid, value);
+        }
+    });
+}
+
+void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
+    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", VdbLayout::levels, level)), level, file);
+    constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
+    for (const GridPlan& plan : planGrids(file.fields)) {
+        const std::string name = gridName(plan.name, VdbLayout::levels, level);
+        const auto at = [&](Tile& tile, int c, int offset) -> float& {
+            return tile.values[std::size_t(plan.firstChannel + c) * kTilePoints + std::size_t(offset)];
+        };
+        if (plan.components == 3) {
+            const auto grid = readTypedGrid<openvdb::Vec3SGrid>(source, name);
+            readValues(*grid, level, file, [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
+                const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
+                for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
+            });
+        } else {
+            const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
+            readValues(*grid, level, file, [&](Tile& tile, int offset, bool valid, float value) {
+                at(tile, 0, offset) = valid ? value : kInvalid;
+            });
+        }
+    }
+}
+
+void listGrids(openvdb::io::File& source, VdbFile& file) {
+    const openvdb::GridPtrVecPtr grids = source.readAllGridMetadata();
+    for (const openvdb::GridBase::Ptr& grid : *grids) {
+        file.gridNames.push_back(grid->getName());
+        const auto count = grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT);
+        file.gridVoxels.push_back(count ? count->value() : std::int64_t(source.readGrid(grid->getName())->activeVoxelCount()));
+    }
+}
+
+VdbFile readWhole(const std::string& path) {
+    openvdb::io::File source(path);
+    source.open(/*delayLoad=*/false);
+    VdbFile file;
+    try {
+        file = decodeMetadata(textEntries(*source.getMetadata()));
+        listGrids(source, file);
+        if (file.layout == VdbLayout::flat) return file;
+        int channels = 0;
+        for (const OutputField& field : file.fields) channels += field.components;
+        file.store = BrickStore(file.tree.brickCells(), file.tree.leafCount(), channels);
+        std::vector<bool> present(std::size_t(file.tree.levelCount()), false);
+        for (const BrickKey& key : file.tree.leaves()) present[std::size_t(key.level)] = true;
+        for (int level = 0; level < file.tree.levelCount(); ++level) {
+            if (present[std::size_t(level)]) readLevelGrids(source, level, file);
+        }
+    } catch (const InputError& error) {
+        refuse(path, error.what());
+    }
+    return file;
+}
+
+FixedFrame frameOfGrid(const std::string& path, const openvdb::GridBase& grid) {
+    const openvdb::math::Transform& transform = grid.transform();
+    const std::string name = "grid " + grid.getName();
+    if (!transform.isLinear()) refuse(path, name + " has a perspective transform, not a lattice of cubes");
+    const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
+    openvdb::Mat3d steps;
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d unit(0, 0, 0);
+        unit[axis] = 1;
+        steps.setCol(axis, transform.indexToWorld(unit) - origin);
+    }
+    const double spacing = transform.voxelSize().x();
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            const double expected = row == column ? spacing : 0.0;
+            // The steps are differences of places, so they carry the rounding of the origin.
+            const double slack = 1e-9 * spacing + 4e-16 * (std::abs(origin[row]) + spacing);
+            if (!(std::abs(steps(row, column) - expected) <= slack))
+                refuse(path, name + " is turned or its voxels aren't cubes, so no lattice of bricks can be like it");
+        }
+    }
+    return {{origin.x(), origin.y(), origin.z()}, spacing};
+}
+
+FixedFrame readFrame(const std::string& path) {
+    openvdb::io::File source(path);
+    source.open(/*delayLoad=*/false);
+    const auto entries = textEntries(*source.getMetadata());
+    if (entries.count("tessera_format")) {
+        try {
+            const VdbMetadata metadata = decodeMetadata(entries);
+            return {metadata.tree.originWorld(), metadata.tree.spacingWorld(0)};
+        } catch (const InputError& error) {
+            refuse(path, error.what());
+        }
+    }
+    const openvdb::GridPtrVecPtr grids = source.readAllGridMetadata();
+    if (grids->empty()) refuse(path, "it holds no grid");
+    return frameOfGrid(path, *grids->front());
+}
+
+}  // namespace
+
+VdbFile readVdb(const std::string& path) {
+    openvdb::initialize();
+    return guarded(path, [&] { return readWhole(path); });
+}
+
+FixedFrame readVdbLattice(const std::string& path) {
+    openvdb::initialize();
+    return guarded(path, [&] { return readFrame(path); });
+}
+
+}  // namespace tessera

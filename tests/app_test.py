@@ -1,0 +1,440 @@
+#!/usr/bin/env python3
+"""Drives the tessera program as a user does: bad input, failing outputs, interruption, series, reports.
+
+usage: app_test.py --tessera PROGRAM --data FOLDER [unittest arguments]
+"""
+
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+TESSERA = ""
+DATA = pathlib.Path()
+
+CUBE_POINTS = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+CUBE_TETS = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
+
+
+def numbers(rows):
+    return " ".join(" ".join(str(v) for v in row) for row in rows)
+
+
+def vtu_text(points=CUBE_POINTS, cells=CUBE_TETS, cell_type=10, fields=None, extra=""):
+    """An ASCII .vtu file; fields: name -> one number a point."""
+    fields = {"f": [p[0] for p in points]} if fields is None else fields
+    size = len(cells[0])
+    arrays = "".join(
+        f'<DataArray type="Float64" Name="{name}" format="ascii">{" ".join(map(str, values))}</DataArray>' for name, values in fields.items()
+    )
+    return f"""<?xml version="1.0"?>
+<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid>
+<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}">
+<PointData>{arrays}{extra}</PointData>
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{numbers(points)}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">{numbers(cells)}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{" ".join(str(size * (i + 1)) for i in range(len(cells)))}</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">{" ".join([str(cell_type)] * len(cells))}</DataArray></Cells>
+</Piece></UnstructuredGrid></VTKFile>
+"""
+
+
+class AppTest(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-app-test-"))
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self.cube = self.write("cube.vtu", vtu_text())
+        self.stokes = DATA / "freefem-stokes-sphere/stokes_p1.vtu"
+
+    def write(self, name, text):
+        path = self.folder / name
+        if isinstance(text, bytes):
+            path.write_bytes(text)
+        else:
+            path.write_text(text)
+        return path
+
+    def run_tessera(self, *arguments, **options):
+        return subprocess.run([TESSERA, *map(str, arguments)], capture_output=True, text=True, timeout=300, cwd=self.folder, **options)
+
+    def succeed(self, *arguments, **options):
+        result = self.run_tessera(*arguments, **options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr, "")
+        return result.stdout
+
+    def report(self, *arguments):
+        return json.loads(self.succeed(*arguments, "--json", "-"))
+
+    def fail(self, code, words, *arguments, **options):
+        """Exit code, one line on stderr that holds every word, and no file more than before."""
+        before = sorted(os.listdir(self.folder))
+        result = self.run_tessera(*arguments, **options)
+        lines = result.stderr.splitlines()
+        self.assertEqual(result.returncode, code, f"{arguments}: {result.stderr}")
+        self.assertEqual(len(lines), 1, result.stderr)
+        self.assertTrue(lines[0].startswith("tessera: "), lines[0])
+        for word in words.split():
+            self.assertIn(word, lines[0])
+        self.assertEqual(sorted(os.listdir(self.folder)), before)
+        return lines[0]
+
+    def resample_fails(self, words, mesh, *options, code=2):
+        return self.fail(code, words, "resample", mesh, "-o", "out.vdb", *options)
+
+
+class BadInput(AppTest):
+    def test_missing_file(self):
+        self.resample_fails("nothing.vtu", "nothing.vtu")
+        self.fail(2, "nothing.vtu", "info", "nothing.vtu")
+        self.fail(2, "nothing.vdb", "info", "nothing.vdb")
+        self.fail(2, "nothing.vtu", "tets", "nothing.vtu", "-o", "tets.vtu")
+        self.resample_fails("none_*.vtu", "none_*.vtu")
+
+    def test_empty_file(self):
+        for name in ("empty.vtu", "empty.vtk", "empty.pvtu", "empty.vts", "empty.ex2", "empty.node", "empty.pvd", "empty.case"):
+            self.write(name, "")
+            self.resample_fails(name, name)
+
+    def test_truncated_file(self):
+        whole = self.stokes.read_bytes()
+        for share in (0.02, 0.3, 0.7, 0.999):
+            self.write("cut.vtu", whole[: int(len(whole) * share)])
+            self.resample_fails("cut.vtu", "cut.vtu")
+
+    def test_garbage(self):
+        garbage = bytes((i * 2654435761 >> 7) & 255 for i in range(5000))
+        for name in ("garbage.vtu", "garbage.vtk", "garbage.ex2", "garbage.cgns"):
+            self.write(name, garbage)
+            self.resample_fails(name, name)
+        self.write("other.vtu", "<?xml version='1.0'?><html><body/></html>")
+        self.resample_fails("other.vtu", "other.vtu")
+
+    def test_unknown_format(self):
+        self.write("mesh.xyz", vtu_text())
+        self.resample_fails("mesh.xyz", "mesh.xyz")
+        self.write("mesh", "hello")
+        self.resample_fails("mesh", "mesh")
+
+    def test_directory_as_mesh(self):
+        (self.folder / "folder.vtu").mkdir()
+        self.resample_fails("folder.vtu", "folder.vtu")
+
+    def test_no_3d_cells(self):
+        self.write("flat.vtu", vtu_text(cells=[(0, 1, 3), (0, 3, 2)], cell_type=5))
+        self.resample_fails("flat.vtu", "flat.vtu")
+
+    def test_no_such_field_lists_those_there(self):
+        self.write("two.vtu", vtu_text(fields={"pressure": range(8), "heat": range(8)}))
+        self.resample_fails("speed pressure heat", "two.vtu", "--field", "speed")
+        self.resample_fails("heat pressure", "two.vtu", "--field", "pressure", "--refine", "error", "--max-error", "1%", "--error-field", "heat")
+
+    def test_non_numeric_array(self):
+        codes = " ".join(["65 0"] * 8)
+        extra = f'<DataArray type="String" Name="label" format="ascii">{codes}</DataArray>'
+        self.write("text.vtu", vtu_text(extra=extra))
+        self.resample_fails("label", "text.vtu", "--field", "label")
+
+    def test_node_index_out_of_range(self):
+        for bad in (8, 1000000, -1):
+            self.write("index.vtu", vtu_text(cells=[(0, 1, 3, bad)]))
+            self.resample_fails("index.vtu", "index.vtu")
+
+    def test_coordinates_that_are_not_finite_name_the_node(self):
+        for text in ("nan", "inf", "-inf"):
+            points = [list(p) for p in CUBE_POINTS]
+            points[5][1] = text
+            self.write("bad.vtu", vtu_text(points=points, fields={"f": range(8)}))
+            self.resample_fails("bad.vtu 5", "bad.vtu")
+
+    def test_options_out_of_range(self):
+        for options in (
+            ["--spacing", "0"], ["--spacing", "-1"], ["--spacing", "nan"], ["--spacing", "inf"], ["--spacing", "abc"],
+            ["--resolution", "0"], ["--resolution", "1"], ["--resolution", "-5"], ["--resolution", "1e3x"],
+            ["--spacing", "0.1", "--resolution", "10"],
+            ["--refine", "sometimes"], ["--refine", "uniform"], ["--refine", "error"],
+            ["--refine", "error", "--max-error", "0"], ["--refine", "error", "--max-error", "-1%"],
+            ["--refine", "error", "--max-error", "%"], ["--refine", "error", "--max-error", "nan"], ["--max-error", "1%"],
+            ["--samples-per-element", "0"], ["--samples-per-element", "-2"], ["--max-levels", "0"], ["--max-levels", "99"],
+            ["--brick-size", "7"], ["--brick-size", "128"], ["--max-voxels", "0"], ["--max-voxels", "x"], ["--max-memory", "-1G"],
+            ["--max-memory", "1X"], ["--bounds", "0,0,0,1,1"], ["--bounds", "0,0,0,0,1,1"], ["--bounds", "0,0,0,a,1,1"],
+            ["--layout", "round"], ["--extend", "-1"], ["--extend", "1000"], ["--background", "nan"], ["--unit-scale", "-1"],
+            ["--up-axis", "x"], ["--threads", "-1"], ["--threads", "many"], ["--field", ""], ["--field", "f,f"], ["--field", "=x"],
+            ["--algorithm", "magic"], ["--time-step", "-3"], ["--error-field", "f"], ["--nonsense"],
+        ):  # fmt: skip
+            with self.subTest(options=options):
+                # An option whose text begins with a dash must not be taken for another option, so it is joined with '='.
+                self.resample_fails("", self.cube, *(options[:-2] + [f"{options[-2]}={options[-1]}"] if len(options) > 1 else options))
+
+    def test_usage(self):
+        self.fail(2, "subcommand")
+        self.fail(2, "", "explode")
+        self.fail(2, "", "resample")
+        self.fail(2, "output", "resample", self.cube)
+        self.fail(2, "", "verify", self.cube)
+        self.fail(2, "", "tets", self.cube)
+        self.fail(2, "", "resample", self.cube, "another.vtu", "-o", "out.vdb")
+
+    def test_budget_exceeded_says_what_fits(self):
+        line = self.resample_fails("", self.cube, "--refine", "uniform", "--spacing", "0.001", "--max-voxels", "1M")
+        self.assertRegex(line, r"\d")
+        self.resample_fails("", self.cube, "--refine", "uniform", "--spacing", "0.001", "--max-memory", "1M")
+
+    def test_bounds_beside_the_mesh(self):
+        self.resample_fails("", self.cube, "--bounds", "5,5,5,6,6,6")
+
+    def test_like_needs_a_vdb_file(self):
+        self.resample_fails("nothing.vdb", self.cube, "--like", "nothing.vdb")
+        self.resample_fails("cube.vtu", self.cube, "--like", self.cube)
+
+    def test_series_needs_a_numbered_output(self):
+        self.write("run_0.vtu", vtu_text())
+        self.write("run_1.vtu", vtu_text())
+        self.resample_fails("####", "run_*.vtu")
+
+    def test_output_may_not_replace_the_input(self):
+        self.fail(2, "cube.vtu", "resample", self.cube, "-o", self.cube)
+        self.assertIn("VTKFile", self.cube.read_text())
+
+    def test_damaged_vdb(self):
+        self.succeed("resample", self.cube, "-o", "good.vdb", "--refine", "uniform", "--resolution", "20", "--quiet")
+        whole = (self.folder / "good.vdb").read_bytes()
+        self.write("cut.vdb", whole[: len(whole) // 2])
+        self.fail(2, "cut.vdb", "info", "cut.vdb")
+        self.fail(2, "cut.vdb", "verify", self.cube, "cut.vdb")
+        self.write("noise.vdb", b"noise" * 100)
+        self.fail(2, "noise.vdb", "info", "noise.vdb")
+
+
+class FailingOutputs(AppTest):
+    def test_not_writable(self):
+        (self.folder / "folder.vdb").mkdir()
+        self.fail(1, "nowhere/out.vdb", "resample", self.cube, "-o", "nowhere/out.vdb")
+        self.fail(1, "folder.vdb", "resample", self.cube, "-o", "folder.vdb")
+        self.fail(1, "nowhere/tets.vtu", "tets", self.cube, "-o", "nowhere/tets.vtu")
+        self.fail(1, "nowhere/report.json", "resample", self.cube, "-o", "out.vdb", "--json", "nowhere/report.json")
+
+    def test_disk_full(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        self.fail(1, "out.vdb", "resample", self.stokes, "-o", "out.vdb", "--quiet", preexec_fn=limit)
+        self.fail(1, "tets.vtu", "tets", self.stokes, "-o", "tets.vtu", "--quiet", preexec_fn=limit)
+
+    def test_disk_full_on_a_small_file_system(self):
+        small = self.folder / "small"
+        small.mkdir()
+        if os.geteuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", small], capture_output=True).returncode:
+            self.skipTest("mounting a small file system needs root")
+        try:
+            self.fail(1, "out.vdb", "resample", self.stokes, "-o", "small/out.vdb", "--quiet")
+            self.assertEqual(os.listdir(small), [])
+        finally:
+            subprocess.run(["umount", small], check=True)
+
+    def test_failure_leaves_the_old_file(self):
+        self.write("out.vdb", "old")
+        self.fail(2, "", "resample", "nothing.vtu", "-o", "out.vdb")
+        self.assertEqual((self.folder / "out.vdb").read_text(), "old")
+
+    def test_out_of_memory(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (1500 << 20, 1500 << 20))
+
+        self.fail(1, "memory", "resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "900",
+                  "--max-voxels", "4G", "--max-memory", "64G", "--threads", "1", preexec_fn=limit)  # fmt: skip
+
+
+class Interruption(AppTest):
+    def start_long_run(self):
+        arguments = ["resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "500", "--threads", "1"]
+        process = subprocess.Popen([TESSERA, *map(str, arguments)], cwd=self.folder, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        return process
+
+    def finish(self, process, code):
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, code, errors)
+        self.assertEqual(len(errors.splitlines()), 1, errors)
+        self.assertEqual(os.listdir(self.folder), ["cube.vtu"])
+
+    def test_interrupt_while_sampling(self):
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            process = self.start_long_run()
+            time.sleep(0.4)
+            self.assertIsNone(process.poll(), "the run ended before it could be interrupted")
+            process.send_signal(number)
+            self.finish(process, code)
+
+    def test_interrupt_while_writing(self):
+        process = self.start_long_run()
+        # The unfinished file is a hidden one; the check for a writable output makes one too, but that is gone at once.
+        end = time.time() + 120
+        while time.time() < end and process.poll() is None:
+            if any(f.startswith(".out") and (self.folder / f).stat().st_size > 0 for f in list_quietly(self.folder)):
+                break
+            time.sleep(0.005)
+        self.assertIsNone(process.poll(), "the run ended before it could be interrupted")
+        process.send_signal(signal.SIGINT)
+        self.finish(process, 130)
+
+
+def list_quietly(folder):
+    return [f for f in os.listdir(folder) if (folder / f).exists()]
+
+
+class Reports(AppTest):
+    def test_defaults_give_a_report(self):
+        text = self.succeed("resample", self.stokes, "-o", "out.vdb", "--json", "report.json")
+        self.assertIn("pressure", text)
+        report = json.loads((self.folder / "report.json").read_text())
+        self.check_schema(report)
+        self.assertEqual(report["mesh"]["elements"], 18598)
+        self.assertEqual(report["mesh"]["skipped_cells"], 1156)
+        self.assertEqual(sum(report["bricks"]["per_level"]), report["bricks"]["total"])
+        cells = report["lattice"]["brick_cells"]
+        self.assertEqual(report["voxels"]["per_level"], [n * cells**3 for n in report["bricks"]["per_level"]])
+        self.assertEqual(report["voxels"]["covered_total"], report["coverage"]["covered_points"])
+        for error in report["error"].values():
+            self.assertLessEqual(error["rms"], error["max"])
+            self.assertLessEqual(error["p999"], error["max"])
+            self.assertAlmostEqual(error["relative_max"] * error["range"], error["max"], delta=1e-12 * error["range"])
+
+    def check_schema(self, report):
+        for key in ("schema", "program", "version", "command", "input", "output", "algorithm", "criterion", "layout", "threads", "stages",
+                    "mesh", "lattice", "bricks", "voxels", "coverage", "error", "statistics", "write", "peak_memory_bytes"):  # fmt: skip
+            self.assertIn(key, report)
+        for stage in ("read", "plan", "resample", "verify", "write"):
+            self.assertGreaterEqual(report["stages"][stage], 0)
+        self.assertEqual(set(report["error"]), {"pressure", "velocity"})
+        for error in report["error"].values():
+            for key in ("max", "p999", "rms", "relative_max", "relative_p999", "relative_rms", "range", "samples", "worst_place"):
+                self.assertIn(key, error)
+        self.assertGreater(report["peak_memory_bytes"], 1 << 20)
+
+    def test_json_on_standard_output_is_all_there_is(self):
+        report = self.report("resample", self.cube, "-o", "out.vdb", "--refine", "uniform", "--resolution", "17")
+        self.assertEqual(report["lattice"]["spacing"], 1 / 16)
+        self.assertLess(report["error"]["f"]["max"], 1e-6)
+        self.assertAlmostEqual(report["error"]["f"]["integral_mesh"][0], 0.5, places=12)
+        self.assertEqual(report["coverage"]["covered_points"], 17**3)
+
+    def test_quiet_prints_nothing(self):
+        self.assertEqual(self.succeed("resample", self.cube, "-o", "out.vdb", "--quiet"), "")
+
+    def test_dry_run_writes_nothing(self):
+        before = sorted(os.listdir(self.folder))
+        for options in ([], ["--refine", "uniform", "--resolution", "40"], ["--refine", "error", "--max-error", "5%"]):
+            text = self.succeed("resample", self.stokes, "-o", "out.vdb", "--dry-run", *options)
+            self.assertIn("levels", text)
+            self.assertIn("flat", text)
+            self.assertEqual(sorted(os.listdir(self.folder)), before)
+        estimate = self.report("resample", self.stokes, "--dry-run", "--refine", "uniform", "--resolution", "40")["estimate"]
+        real = self.report("resample", self.stokes, "-o", "out.vdb", "--refine", "uniform", "--resolution", "40")
+        self.assertEqual(estimate["levels"]["voxels"], real["voxels"]["total"])
+
+    def test_info_tells_what_was_written(self):
+        written = self.report("resample", self.stokes, "-o", "out.vdb", "--field", "pressure=p")
+        info = self.report("info", "out.vdb")
+        self.assertEqual(info["error"], written["error"])
+        self.assertEqual(info["lattice"], written["lattice"])
+        self.assertEqual(info["voxels"], written["voxels"])
+        self.assertTrue(any(grid["name"].startswith("p_level_") for grid in info["grids"]))
+        self.assertEqual(self.report("info", self.stokes)["mesh"]["nodes"], written["mesh"]["nodes"])
+
+    def test_verify_confirms_the_file(self):
+        for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"]):
+            self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", *options)
+            report = self.report("verify", self.stokes, "out.vdb")
+            self.assertTrue(report["holds"])
+            self.assertGreater(report["samples"]["covered"], 100)
+
+    def test_verify_denies_a_file_of_another_field(self):
+        self.write("other.vtu", vtu_text(fields={"f": [3 * p[0] for p in CUBE_POINTS]}))
+        self.succeed("resample", "other.vtu", "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "20")
+        self.fail(2, "claims", "verify", self.cube, "out.vdb", "--quiet")
+        self.write("named.vtu", vtu_text(fields={"g": range(8)}))
+        self.fail(2, "'f'", "verify", "named.vtu", "out.vdb", "--quiet")
+
+    def test_nan_values_are_counted(self):
+        self.write("nan.vtu", vtu_text(fields={"f": ["nan"] + list(range(7))}))
+        report = self.report("resample", "nan.vtu", "-o", "out.vdb", "--refine", "uniform", "--resolution", "9")
+        self.assertEqual(report["coverage"]["covered_points"], 9**3)
+        self.assertLess(report["error"]["f"]["valid_points"], 9**3)
+        self.assertTrue(self.report("verify", "nan.vtu", "out.vdb")["holds"])
+
+    def test_any_number_of_threads_gives_the_same_file(self):
+        files = set()
+        for threads in (1, 2, 5):
+            self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--threads", threads)
+            files.add((self.folder / "out.vdb").read_bytes())
+        self.assertEqual(len(files), 1)
+
+    def test_like_uses_the_lattice_of_the_other_file(self):
+        self.succeed("resample", self.cube, "-o", "a.vdb", "--refine", "uniform", "--spacing", "0.07", "--quiet")
+        self.succeed("resample", self.cube, "-o", "b.vdb", "--refine", "uniform", "--like", "a.vdb", "--quiet")
+        a, b = (self.report("info", name)["lattice"] for name in ("a.vdb", "b.vdb"))
+        self.assertEqual(a["spacing"], b["spacing"])
+        steps = [(x - y) / a["spacing"] for x, y in zip(a["origin"], b["origin"])]
+        for step in steps:
+            self.assertAlmostEqual(step, round(step), places=9)
+
+    def test_tets_are_those_of_the_mesh(self):
+        self.succeed("tets", self.cube, "-o", "tets.vtu", "--quiet")
+        mesh = self.report("info", "tets.vtu")["mesh"]
+        self.assertEqual((mesh["elements"], mesh["nodes"]), (6, 8))
+
+    def test_picture_is_a_png(self):
+        self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet")
+        self.succeed("picture", "out.vdb", "-o", "slice.png", "--field", "pressure", "--axis", "y")
+        self.assertTrue((self.folder / "slice.png").read_bytes().startswith(b"\x89PNG\r\n"))
+        self.fail(2, "speed pressure", "picture", "out.vdb", "-o", "other.png", "--field", "speed")
+
+
+class Series(AppTest):
+    def setUp(self):
+        super().setUp()
+        for step in range(3):
+            points = [(x * (1 + step), y, z) for x, y, z in CUBE_POINTS]
+            self.write(f"run_{step}.vtu", vtu_text(points=points, fields={"f": [step * p[0] ** 2 for p in points]}))
+        collection = "".join(f'<DataSet timestep="{s}" file="run_{s}.vtu"/>' for s in range(3))
+        self.write("all.pvd", f'<?xml version="1.0"?><VTKFile type="Collection"><Collection>{collection}</Collection></VTKFile>')
+
+    def test_all_steps_share_one_lattice(self):
+        for source in ("run_*.vtu", "all.pvd"):
+            for options in (["--refine", "element-size"], ["--refine", "error", "--max-error", "5%"], ["--refine", "uniform", "--resolution", "30"]):
+                self.succeed("resample", source, "-o", "out_####.vdb", "--json", "report.json", *options)
+                report = json.loads((self.folder / "report.json").read_text())
+                self.assertEqual(len(report["steps"]), 3)
+                self.assertEqual(report["series"]["fields"][0]["ranges"], [[0, 18]])
+                self.assertGreaterEqual(report["stages"]["read"], 0)
+                lattices = []
+                for step in range(3):
+                    info = self.report("info", f"out_{step:04}.vdb")
+                    lattices.append((info["lattice"]["origin"], info["lattice"]["spacing"]))
+                    (self.folder / f"out_{step:04}.vdb").unlink()
+                self.assertEqual(lattices[0], lattices[1])
+                self.assertEqual(lattices[0], lattices[2])
+
+
+class Help(AppTest):
+    def test_every_command_has_help_with_an_example(self):
+        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"]):
+            text = self.succeed(*command, "--help")
+            self.assertIn("Example", text)
+        self.assertRegex(self.succeed("--version"), r"^tessera \d+\.\d+\.\d+\n$")
+
+
+if __name__ == "__main__":
+    arguments = sys.argv[1:]
+    TESSERA = str(pathlib.Path(arguments[arguments.index("--tessera") + 1]).resolve())
+    DATA = pathlib.Path(arguments[arguments.index("--data") + 1]).resolve()
+    rest = [a for i, a in enumerate(arguments) if a not in ("--tessera", "--data") and (i == 0 or arguments[i - 1] not in ("--tessera", "--data"))]
+    unittest.main(argv=[sys.argv[0], *rest])

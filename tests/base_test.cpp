@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "base/error.h"
+#include "base/execution.h"
+#include "base/timer.h"
+#include "base/vec.h"
+
+namespace tessera {
+namespace {
+
+TEST(ParallelFor, visitsEveryItemOnceForAnyThreadCount) {
+    for (const int threads : {1, 2, 5, 16}) {
+        Execution execution;
+        execution.threads = threads;
+        std::vector<std::atomic<int>> visits(1000);
+        parallelFor(execution, 1000, [&](std::int64_t i) { ++visits[std::size_t(i)]; });
+        for (const auto& visit : visits) EXPECT_EQ(visit, 1);
+    }
+}
+
+TEST(ParallelFor, rethrowsTheBodysException) {
+    for (const int threads : {1, 4}) {
+        Execution execution;
+        execution.threads = threads;
+        EXPECT_THROW(parallelFor(execution, 100, [](std::int64_t i) { if (i == 50) throw InputError("fifty"); }), InputError);
+    }
+}
+
+TEST(ParallelFor, stopsWhenCancelled) {
+    for (const int threads : {1, 4}) {
+        std::atomic<bool> cancel{false};
+        std::atomic<int> done{0};
+        Execution execution;
+        execution.threads = threads;
+        execution.cancel = &cancel;
+        EXPECT_THROW(parallelFor(execution, 100000,
+                                 [&](std::int64_t) {
+                                     if (++done == 10) cancel = true;
+                                 }),
+                     Cancelled);
+        EXPECT_LT(done, 1000);
+    }
+}
+
+TEST(ParallelFor, usesSeveralThreadsWhenAsked) {
+    Execution execution;
+    execution.threads = 4;
+    std::mutex mutex;
+    std::set<std::thread::id> seen;
+    std::atomic<int> waiting{0};
+    // Every item waits until a second thread has arrived, so one thread alone could not finish.
+    parallelFor(execution, 2, [&](std::int64_t) {
+        ++waiting;
+        while (waiting < 2) std::this_thread::yield();
+        std::lock_guard lock(mutex);
+        seen.insert(std::this_thread::get_id());
+    });
+    EXPECT_EQ(seen.size(), 2u);
+}
+
+TEST(ParallelForChunks, chunkBordersDoNotDependOnThreads) {
+    for (const int threads : {1, 3, 16}) {
+        Execution execution;
+        execution.threads = threads;
+        std::mutex mutex;
+        std::set<std::pair<std::int64_t, std::int64_t>> chunks;
+        parallelForChunks(execution, 25, 10, [&](std::int64_t begin, std::int64_t end) {
+            std::lock_guard lock(mutex);
+            chunks.insert({begin, end});
+        });
+        EXPECT_EQ(chunks, (std::set<std::pair<std::int64_t, std::int64_t>>{{0, 10}, {10, 20}, {20, 25}}));
+    }
+}
+
+TEST(Check, namesTheConditionAndThePlace) {
+    try {
+        TESSERA_CHECK(1 + 1 == 3, "arithmetic");
+        FAIL();
+    } catch (const InternalError& error) {
+        EXPECT_NE(std::string(error.what()).find("1 + 1 == 3"), std::string::npos);
+        EXPECT_NE(std::string(error.what()).find("base_test.cpp"), std::string::npos);
+    }
+}
+
+TEST(FloorDiv, roundsTowardsMinusInfinity) {
+    EXPECT_EQ(floorDiv(7, 4), 1);
+    EXPECT_EQ(floorDiv(-1, 4), -1);
+    EXPECT_EQ(floorDiv(-4, 4), -1);
+    EXPECT_EQ(floorDiv(-5, 4), -2);
+}
+
+TEST(PeakMemory, growsWithWhatIsUsed) {
+    const long long before = peakMemoryBytes();
+    std::vector<char> block(std::size_t(64) << 20, 1);
+    EXPECT_GE(peakMemoryBytes() + block.back(), before + (32 << 20));
+}
+
+}  // namespace
+}  // namespace tessera

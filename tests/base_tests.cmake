@@ -1,0 +1,1 @@
+tessera_test(base_test LINK base)

@@ -1,0 +1,88 @@
+// The contract on real meshes: those bundled with the project, and those of the shared folder where it is present.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "contract_suite.h"
+#include "io/read_mesh.h"
+#include "reference/fields.h"
+#include "registry/registry.h"
+
+namespace tessera::contract {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> meshFiles() {
+    static constexpr const char* kExtensions[] = {".vtu", ".vtk", ".vts"};
+    std::vector<fs::path> files;
+    for (const char* folder : {TESSERA_DATA_DIR, TESSERA_SHARED_DATA_DIR}) {
+        std::error_code error;
+        for (const auto& entry : fs::recursive_directory_iterator(folder, error))
+            if (std::find(std::begin(kExtensions), std::end(kExtensions), entry.path().extension()) != std::end(kExtensions))
+                files.push_back(entry.path());
+    }
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+using OnFile = std::tuple<const Resampler*, fs::path>;
+
+class ContractOnData : public testing::TestWithParam<OnFile> {
+  protected:
+    void SetUp() override {
+        const std::string reason = resampler().unavailableReason();
+        if (!reason.empty()) GTEST_SKIP() << resampler().name() << ": " << reason;
+        mesh_ = readMesh(std::get<1>(GetParam()), {}, {}).mesh;
+        addElementIdField(mesh_, "element of the test");
+        addRandomField(mesh_, "random of the test", FieldLocation::point, 1, 0, 1, 3);
+    }
+    const Resampler& resampler() const { return *std::get<0>(GetParam()); }
+
+    /// About `points` lattice points along the longest axis.
+    std::vector<LatticeCase> lattices(int points) const {
+        const Vec3d size = mesh_.boundsWorld().size();
+        const double longest = std::max({size.x, size.y, size.z});
+        return latticesAbout(mesh_, longest / scaledPoints(points), points);
+    }
+
+    TetMesh mesh_;
+};
+
+TEST_P(ContractOnData, HasNoHolesSpillOvershootOrWrongValues) {
+    ContractReport total;
+    for (const LatticeCase& at : lattices(32))
+        if (at.name == "aligned" || at.name == "third offset" || at.name == "fine" || at.name == "cut plane")
+            total += expectContract(resampler(), mesh_, at);
+    EXPECT_GT(total.inMesh, 0);
+    RecordProperty("worst_accuracy_ratio", std::to_string(total.worstRatio));
+    RecordProperty("covered", std::to_string(total.covered));
+}
+
+TEST_P(ContractOnData, GivesTheSameBitsAlways) {
+    for (const LatticeCase& at : lattices(40))
+        if (at.name == "aligned") expectDeterministic(resampler(), mesh_, at);
+}
+
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ContractOnData);
+INSTANTIATE_TEST_SUITE_P(All, ContractOnData,
+                         testing::Combine(testing::ValuesIn(resamplers().begin(), resamplers().end()),
+                                          testing::ValuesIn(meshFiles())),
+                         [](const testing::TestParamInfo<OnFile>& param) {
+                             const fs::path& file = std::get<1>(param.param);
+                             std::string name = std::string(std::get<0>(param.param)->name()) + "_" +
+                                                file.parent_path().filename().string() + "_" + file.filename().string();
+                             for (char& c : name)
+                                 if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+                             return name + "_" + std::to_string(param.index);
+                         });
+
+TEST(SharedData, IsThere) {
+    if (!fs::exists(TESSERA_SHARED_DATA_DIR)) GTEST_SKIP() << "no shared meshes at " << TESSERA_SHARED_DATA_DIR;
+    EXPECT_GE(meshFiles().size(), 20u);
+}
+
+}  // namespace
+}  // namespace tessera::contract

@@ -1,0 +1,173 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "base/error.h"
+#include "contract_suite.h"
+#include "oracle_resampler.h"
+#include "reference/fields.h"
+#include "reference/generators.h"
+#include "registry/registry.h"
+
+namespace tessera::contract {
+namespace {
+
+/// Every registered resampler and, to try the suite itself, the oracle.
+std::vector<const Resampler*> subjects() {
+    static const OracleResampler oracle;
+    std::vector<const Resampler*> all(resamplers().begin(), resamplers().end());
+    all.push_back(&oracle);
+    return all;
+}
+
+std::string nameOf(const Resampler& resampler) {
+    std::string name(resampler.name());
+    name[0] = char(std::toupper(name[0]));
+    return name;
+}
+
+using OnMesh = std::tuple<const Resampler*, MeshCase>;
+
+class Contract : public testing::TestWithParam<OnMesh> {
+  protected:
+    void SetUp() override {
+        const std::string reason = resampler().unavailableReason();
+        if (!reason.empty()) GTEST_SKIP() << resampler().name() << ": " << reason;
+        mesh_ = meshCase().make();
+        addTestFields(mesh_);
+        isSlow_ = resampler().name() == "oracle";
+    }
+    const Resampler& resampler() const { return *std::get<0>(GetParam()); }
+    const MeshCase& meshCase() const { return std::get<1>(GetParam()); }
+    std::vector<LatticeCase> lattices() const {
+        return latticesAbout(mesh_, meshCase().alignedSpacing, isSlow_ ? 8 : 24);
+    }
+
+    TetMesh mesh_;
+    bool isSlow_ = false;
+};
+
+TEST_P(Contract, HasNoHolesSpillOvershootOrWrongValues) {
+    ContractReport total;
+    for (const LatticeCase& at : lattices()) {
+        if (isSlow_ && at.name != "aligned" && at.name != "fine" && at.name != "cut plane") continue;
+        total += expectContract(resampler(), mesh_, at);
+    }
+    RecordProperty("worst_accuracy_ratio", std::to_string(total.worstRatio));
+    RecordProperty("covered", std::to_string(total.covered));
+}
+
+TEST_P(Contract, GivesTheSameBitsAlways) {
+    for (const LatticeCase& at : lattices()) {
+        if (isSlow_ && at.name != "coarse") continue;
+        expectDeterministic(resampler(), mesh_, at);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Contract, testing::Combine(testing::ValuesIn(subjects()), testing::ValuesIn(meshCases())),
+                         [](const testing::TestParamInfo<OnMesh>& param) {
+                             return nameOf(*std::get<0>(param.param)) + "On" + std::get<1>(param.param).name;
+                         });
+
+class ContractOf : public testing::TestWithParam<const Resampler*> {
+  protected:
+    void SetUp() override {
+        const std::string reason = GetParam()->unavailableReason();
+        if (!reason.empty()) GTEST_SKIP() << GetParam()->name() << ": " << reason;
+    }
+};
+
+TEST_P(ContractOf, NamesItsTargetsAndRefusesOthers) {
+    const std::vector<std::string> targets = GetParam()->targets();
+    ASSERT_FALSE(targets.empty());
+    EXPECT_EQ(std::set<std::string>(targets.begin(), targets.end()).size(), targets.size());
+    const TetMesh mesh = boxMesh({});
+    for (const std::string& target : targets) EXPECT_NE(GetParam()->bind(mesh, {}, target), nullptr);
+    EXPECT_THROW(GetParam()->bind(mesh, {}, "no such target"), InputError);
+}
+
+TEST_P(ContractOf, CoversTheClosedBoxExactly) {
+    // Closed forms: an aligned lattice has (cells + 1)^3 points in a box, one at half offset cells^3.
+    TetMesh mesh = boxMesh({.cells = {2, 2, 2}, .sizeWorld = {8, 8, 8}});
+    const IndexBox box{Vec3i(-2), Vec3i(12)};
+    const auto count = [&](const Vec3d& origin) {
+        const Block block = resampleBlock(*GetParam(), mesh, {}, Lattice::axisParallel(origin, 1), box);
+        return std::count(block.coverage.begin(), block.coverage.end(), 1);
+    };
+    EXPECT_EQ(count(Vec3d(0)), 9 * 9 * 9);
+    EXPECT_EQ(count(Vec3d(0.5)), 8 * 8 * 8);
+    EXPECT_EQ(count({0, 0.5, 1.0 / 3}), 9 * 8 * 8);
+    // Just inside on one side, and outside on the other by less than a resampler may spill.
+    EXPECT_GE(count({1e-300, 0, 0}), 8 * 9 * 9);
+    EXPECT_LE(count({1e-300, 0, 0}), 9 * 9 * 9);
+    // Outside by more than any may spill.
+    EXPECT_EQ(count({0x1p-7, 0, 0}), 8 * 9 * 9);
+}
+
+TEST_P(ContractOf, TakesLatticePointsAsRealNumbers) {
+    // An edge of tet i runs from 0 to the first double at or beyond i times the double 0.1, which often isn't their rounded product.
+    const Lattice lattice{Vec3d(0), {0.1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    constexpr int kTets = 59;
+    TetMesh mesh;
+    std::int64_t points = 0;
+    for (int i = 1; i <= kTets; ++i) {
+        const mpq_class point = mpq_class(0.1) * i;
+        double node = point.get_d();
+        if (mpq_class(node) < point) node = std::nextafter(node, 10.0);
+        const auto n = std::int32_t(mesh.points.size());
+        const double y = i;
+        mesh.points.insert(mesh.points.end(), {{0, y, 0}, {node, y, 0}, {0, y + 0.01, 0}, {0, y, 1}});
+        mesh.tets.push_back({n, n + 1, n + 2, n + 3});
+        points += i + 1;
+    }
+    const IndexBox box{{-1, 0, 0}, {kTets + 3, kTets + 2, 1}};
+    const Oracle oracle(mesh, lattice);
+    const ContractBounds bounds{GetParam()->spillBoundVoxels(), GetParam()->placeBoundVoxels()};
+    const Block block = resampleBlock(*GetParam(), mesh, {}, lattice, box);
+    const ReferenceBlock reference = referenceBlock(oracle, box, {.toleranceVoxels = bounds.spillVoxels});
+    const ContractReport report = checkContract(block, reference, oracle, {}, bounds);
+    EXPECT_TRUE(report.isClean()) << report.summary();
+    EXPECT_EQ(report.inMesh, points);
+}
+
+TEST_P(ContractOf, ReproducesALinearFieldExactlyAtNodes) {
+    TetMesh mesh = boxMesh({.cells = {3, 4, 5}, .sizeWorld = {3, 4, 5}});
+    addPointField(mesh, "sum", {[](const Vec3d& p) { return p.x + 10 * p.y + 100 * p.z; }});
+    const IndexBox box{{0, 0, 0}, {4, 5, 6}};
+    const Block block = resampleBlock(*GetParam(), mesh, std::vector{0}, Lattice::axisParallel(Vec3d(0), 1), box);
+    Vec3i p;
+    for (p.z = 0; p.z < 6; ++p.z)
+        for (p.y = 0; p.y < 5; ++p.y)
+            for (p.x = 0; p.x < 4; ++p.x) {
+                ASSERT_TRUE(block.covered(p));
+                // Four ulp of the largest value in the mesh.
+                EXPECT_NEAR(block.value(0, p), p.x + 10 * p.y + 100 * p.z, 4 * 0x1p-14);
+            }
+}
+
+TEST_P(ContractOf, LeavesAnEmptyMeshAndAnEmptyBoxUncovered) {
+    const IndexBox box{Vec3i(0), Vec3i(3)};
+    const Lattice lattice = Lattice::axisParallel(Vec3d(0), 1);
+    EXPECT_EQ(resampleBlock(*GetParam(), TetMesh{}, {}, lattice, box).coverage, std::vector<std::uint8_t>(27, 0));
+    TetMesh flat;
+    flat.points = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {1, 1, 0}};
+    flat.tets = {{0, 1, 2, 3}};
+    EXPECT_EQ(resampleBlock(*GetParam(), flat, {}, lattice, box).coverage, std::vector<std::uint8_t>(27, 0));
+    EXPECT_EQ(resampleBlock(*GetParam(), boxMesh({}), {}, lattice, {Vec3i(1), Vec3i(1)}).count(), 0u);
+}
+
+TEST_P(ContractOf, CoversATenthOfAMillionElementsInOneVoxel) {
+    // 102,480 elements in one voxel whose corner is the middle of their box, a lattice point and a node.
+    TetMesh mesh = boxMesh({.cells = {20, 20, 20}, .originWorld = Vec3d(-0.125), .sizeWorld = Vec3d(0.25)});
+    appendMesh(mesh, dustMesh(Vec3d(0.3), 0.2, 0.01, 54480, 5));
+    addTestFields(mesh);
+    const LatticeCase at{"one voxel", Lattice::axisParallel(Vec3d(0), 1), {Vec3i(-1), Vec3i(3)}};
+    const ContractReport report = expectContract(*GetParam(), mesh, at);
+    EXPECT_EQ(report.inMesh, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ContractOf, testing::ValuesIn(subjects()),
+                         [](const testing::TestParamInfo<const Resampler*>& param) { return nameOf(*param.param); });
+
+}  // namespace
+}  // namespace tessera::contract

@@ -1,0 +1,8 @@
+tessera_test(oracle_test LINK reference)
+tessera_test(contract_checker_test LINK reference SOURCES contract_suite.cpp oracle_resampler.cpp)
+tessera_test(contract_test LINK reference registry SOURCES contract_suite.cpp oracle_resampler.cpp)
+set_tests_properties(oracle_test contract_checker_test contract_test PROPERTIES TIMEOUT 900)
+if(TARGET tessera_io)
+  tessera_test(contract_data_test LINK reference registry io SOURCES contract_suite.cpp)
+  set_tests_properties(contract_data_test PROPERTIES TIMEOUT 900)
+endif()

@@ -1,0 +1,3 @@
+if(TESSERA_BUILD_IO)
+  tessera_test(vdb_file_test LINK io PRIVATE_LINK tessera_openvdb)
+endif()

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "resample/resampler.h"
+
+namespace tessera::contract {
+
+/// A slow resampler made of the oracle itself: the deepest element that contains the point owns it, the lowest index among equals.
+/// It shows that the suite accepts a right answer.
+class OracleResampler : public Resampler {
+  public:
+    std::string_view name() const override { return "oracle"; }
+    std::string_view description() const override { return "rational arithmetic"; }
+    double spillBoundVoxels() const override { return 0x1p-12; }
+    double placeBoundVoxels() const override { return 0x1p-24; }
+    std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
+                                         std::string_view target) const override;
+};
+
+}  // namespace tessera::contract

@@ -1,0 +1,165 @@
+// What the contract suite can't see from outside: node places, ownership depth, element lists.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "base/error.h"
+#include "registry/registry.h"
+#include "software/element_bins.h"
+#include "software/element_depth.h"
+#include "software/node_frame.h"
+#include "software/software_resampler.h"
+
+namespace tessera {
+namespace {
+
+double exactError(const NodeFrame& frame, const TetMesh& mesh, std::size_t node, std::size_t axis) {
+    const auto exact = exactIndexFromWorld(frame.lattice, mesh.points[node]);
+    const mpq_class difference =
+        exact[axis] - mpq_class(frame.nodes[node].whole[axis]) - mpq_class(frame.nodes[node].part[axis]);
+    return std::fabs(difference.get_d());
+}
+
+TEST(NodeFrame, keepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
+    std::mt19937_64 random(7);
+    for (const double offset : {0.0, 1.0, 1e6, -1e9}) {
+        TetMesh mesh;
+        std::uniform_real_distribution<double> uniform(-1, 1);
+        for (int i = 0; i < 200; ++i)
+            mesh.points.push_back({offset + uniform(random), offset + 1e-3 * uniform(random), 1e5 * uniform(random)});
+        for (const double spacing : {1.0, 0.1, 1.0 / 3, 1e-3, 12345.678}) {
+            const NodeFrame frame =
+                frameNodes(mesh, Lattice::axisParallel({offset + 0.1, offset - 0.7, 0.3}, spacing), {});
+            for (std::size_t n = 0; n < mesh.points.size(); ++n)
+                for (std::size_t a = 0; a < 3; ++a) EXPECT_LE(exactError(frame, mesh, n, a), 4 * 0x1p-53);
+        }
+    }
+}
+
+TEST(NodeFrame, turnedLatticesAreAsAccurate) {
+    TetMesh mesh;
+    std::mt19937_64 random(8);
+    std::uniform_real_distribution<double> uniform(-10, 10);
+    for (int i = 0; i < 200; ++i) mesh.points.push_back({uniform(random), uniform(random), uniform(random)});
+    const Lattice lattice{{0.1, 0.2, 0.3}, {0.02, 0.01, 0}, {-0.01, 0.02, 0.003}, {0.001, -0.002, 0.05}};
+    const NodeFrame frame = frameNodes(mesh, lattice, {});
+    for (std::size_t n = 0; n < mesh.points.size(); ++n)
+        for (std::size_t a = 0; a < 3; ++a) EXPECT_LE(exactError(frame, mesh, n, a), 4 * 0x1p-53);
+}
+
+TEST(ElementDepth, isTheDistanceToTheNearestFacePlane) {
+    TetMesh mesh;
+    mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
+    mesh.tets = {{0, 1, 2, 3}, {1, 0, 2, 3}};   // both orientations
+    const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
+    for (const std::int32_t element : {0, 1}) {
+        const ElementDepth depth(mesh, frame, element);
+        EXPECT_DOUBLE_EQ(depth.at({1, 2, 1}), 1.0);
+        EXPECT_DOUBLE_EQ(depth.at({2, 2, 2}), 2 / std::sqrt(3.0));
+        EXPECT_DOUBLE_EQ(depth.at({0, 2, 1}), 0.0);
+        EXPECT_DOUBLE_EQ(depth.at({-1, 2, 1}), -1.0);
+    }
+}
+
+TEST(ElementDepth, survivesNeedlesThatDoubleCannotResolve) {
+    TetMesh mesh;
+    const double w = 1e-9;
+    mesh.points = {{0, 0, 0}, {100.1, 70.3, 33.7}, {100.1 + w, 70.3, 33.7}, {100.1, 70.3 + w, 33.7 + w}};
+    mesh.tets = {{0, 1, 2, 3}};
+    const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
+    const double deep = ElementDepth(mesh, frame, 0).at({0, 0, 0});
+    EXPECT_NEAR(deep, 0.0, 1e-4);
+}
+
+TEST(ElementBins, holdEveryElementWhoseBoxHasAPointOfTheRegion) {
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> place(-5, 70), extent(-3, 3);
+    TetMesh mesh;
+    for (int e = 0; e < 3000; ++e) {
+        const Vec3d corner{place(random), place(random), place(random)};
+        std::array<std::int32_t, 4> tet;
+        for (std::size_t k = 0; k < 4; ++k) {
+            tet[k] = std::int32_t(mesh.points.size());
+            mesh.points.push_back(corner + Vec3d{extent(random), extent(random), extent(random)});
+        }
+        mesh.tets.push_back(tet);
+    }
+    const std::vector<IndexBox> regions{{{0, 0, 0}, {16, 16, 16}}, {{16, 0, 0}, {48, 32, 32}}, {{8, 8, 8}, {24, 24, 9}},
+                                        {{60, 60, 60}, {61, 61, 61}}, {{-4, 30, 0}, {13, 47, 64}}};
+    const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
+    const ElementBins bins = binElements(mesh, frame, regions, {});
+    for (std::size_t r = 0; r < regions.size(); ++r) {
+        const auto listed = bins.of(r);
+        EXPECT_TRUE(std::is_sorted(listed.begin(), listed.end()));
+        EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end()), listed.end()) << "an element stands twice";
+        for (std::int32_t e = 0; e < mesh.elementCount(); ++e) {
+            Box3d box;
+            for (const std::int32_t node : mesh.tets[std::size_t(e)]) box.include(mesh.points[std::size_t(node)]);
+            bool holds = true;
+            for (int a = 0; a < 3; ++a)
+                holds = holds && std::max(std::ceil(box.min[a]), double(regions[r].min[a])) <=
+                                     std::min(std::floor(box.max[a]), double(regions[r].max[a] - 1));
+            if (holds) {
+                EXPECT_TRUE(std::binary_search(listed.begin(), listed.end(), e)) << "element " << e << " region " << r;
+            }
+        }
+    }
+}
+
+TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
+    TetMesh mesh;
+    mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
+    mesh.tets = {{0, 1, 2, 3}};
+    const SoftwareResampler software;
+    const auto bound = software.bind(mesh, {}, {});
+    const std::vector<IndexBox> boxes{{{0, 0, 0}, {9, 9, 9}}, {{3, 3, 3}, {3, 9, 9}}, {{100, 100, 100}, {108, 108, 108}}};
+    std::vector<int> calls(boxes.size(), 0);
+    Execution execution;
+    execution.threads = 1;
+    const auto statistics = bound->resample(
+        Lattice::axisParallel({0, 0, 0}, 1), boxes,
+        [&](std::size_t box, const Block& block) {
+            ++calls[box];
+            EXPECT_EQ(block.box, boxes[box]);
+            EXPECT_EQ(block.coverage.size(), block.count());
+        },
+        execution);
+    EXPECT_EQ(calls, (std::vector<int>{1, 1, 1}));
+    EXPECT_EQ(statistics.coveredPoints, 165);   // points with i + j + k <= 8: 11 choose 3
+}
+
+TEST(SoftwareResampler, refusesLatticesThatCannotBe) {
+    TetMesh mesh;
+    const SoftwareResampler software;
+    const auto bound = software.bind(mesh, {}, {});
+    const IndexBox box{{0, 0, 0}, {1, 1, 1}};
+    const auto ignore = [](std::size_t, const Block&) {};
+    for (const double spacing : {0.0, double(NAN), double(INFINITY)})
+        EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, spacing), {&box, 1}, ignore, {}), InputError);
+    const IndexBox far{{0, 0, 0}, {(1 << 30) + 1, 1, 1}};
+    EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, 1), {&far, 1}, ignore, {}), InputError);
+}
+
+TEST(SoftwareResampler, aTargetThatIsAskedForRuns) {
+    TetMesh mesh;
+    const SoftwareResampler software;
+    ASSERT_FALSE(software.targets().empty());
+    for (const std::string& target : software.targets()) EXPECT_EQ(software.bind(mesh, {}, target)->target(), target);
+    EXPECT_EQ(software.bind(mesh, {}, {})->target(), software.targets().front());
+    EXPECT_THROW(software.bind(mesh, {}, "no such"), InputError);
+}
+
+TEST(Registry, findsByNameAndListsTheNamesOtherwise) {
+    EXPECT_EQ(findResampler("software").name(), "software");
+    try {
+        findResampler("hardware");
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("software"), std::string::npos);
+    }
+}
+
+}  // namespace
+}  // namespace tessera

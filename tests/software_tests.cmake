@@ -1,0 +1,1 @@
+tessera_test(software_test LINK software registry)
