@@ -1,4 +1,5 @@
-// A checker that can't fail is worth nothing: right blocks pass, and blocks with one thing wrong are caught, each for that thing.
+// A checker that can't fail is worth nothing: right blocks pass, and blocks with one thing wrong are caught,
+// each for that thing.
 
 #include <gtest/gtest.h>
 
@@ -19,12 +20,16 @@ constexpr ContractBounds kBounds;
 /// A mesh, the oracle's own block of it, and the reference to check against.
 struct Setting {
     Setting(TetMesh given, const Lattice& lattice, const IndexBox& box)
-        : mesh(std::move(given)), fields(allFields(mesh)), oracle(mesh, lattice),
+        : mesh(std::move(given)),
+          fields(allFields(mesh)),
+          oracle(mesh, lattice),
           reference(referenceBlock(oracle, box, {.toleranceVoxels = kBounds.spillVoxels})),
           block(resampleBlock(OracleResampler(), mesh, fields, lattice, box)) {}
 
     ContractReport check() const { return checkContract(block, reference, oracle, fields, kBounds); }
-    float& value(int channel, const Vec3i& p) { return block.values[std::size_t(channel) * block.count() + block.offset(p)]; }
+    float& value(int channel, const Vec3i& p) {
+        return block.values[std::size_t(channel) * block.count() + block.offset(p)];
+    }
 
     TetMesh mesh;
     std::vector<int> fields;
@@ -48,10 +53,10 @@ TEST(CheckContract, PassesTheOraclesOwnBlock) {
     const Setting s = jitteredBox();
     const ContractReport report = s.check();
     EXPECT_TRUE(report.isClean()) << report.summary();
-    EXPECT_GE(report.covered, 11 * 11 * 11);   // 1 / 11 rounds up or down: the last layer may be out
+    EXPECT_GE(report.covered, 11 * 11 * 11);  // 1 / 11 rounds up or down: the last layer may be out
     EXPECT_EQ(report.covered, report.inMesh);
     EXPECT_GT(report.worstRatio, 0);
-    EXPECT_LE(report.worstRatio, 0.13);   // half an ulp of the value over four of the largest
+    EXPECT_LE(report.worstRatio, 0.13);  // half an ulp of the value over four of the largest
 }
 
 TEST(CheckContract, CatchesAHole) {
@@ -60,7 +65,8 @@ TEST(CheckContract, CatchesAHole) {
     const ContractReport report = s.check();
     EXPECT_EQ(report.holes, 1);
     EXPECT_FALSE(report.isClean());
-    EXPECT_NE(report.firstOffence.find("hole at lattice point (0 0 0)"), std::string::npos) << report.firstOffence;
+    EXPECT_NE(report.firstOffence.find("hole at lattice point (0 0 0)"), std::string::npos)
+        << report.firstOffence;
     EXPECT_NE(report.firstOffence.find("element"), std::string::npos) << report.firstOffence;
 }
 
@@ -69,7 +75,8 @@ TEST(CheckContract, CatchesSpill) {
     s.block.coverage[s.block.offset({-1, 4, 4})] = 1;
     const ContractReport report = s.check();
     EXPECT_EQ(report.spill, 1);
-    EXPECT_EQ(report.holes + report.overshoot + report.inaccurate + report.wrongOwner + report.wrongValidity, 0);
+    EXPECT_EQ(report.holes + report.overshoot + report.inaccurate + report.wrongOwner + report.wrongValidity,
+              0);
 }
 
 TEST(CheckContract, AllowsSpillWithinTheBoundOnly) {
@@ -79,7 +86,7 @@ TEST(CheckContract, AllowsSpillWithinTheBoundOnly) {
         Setting s(std::move(mesh), Lattice::axisParallel({-distance, 0.3, 0.4}, 1), {{0, 1, 1}, {1, 2, 2}});
         ASSERT_EQ(s.block.coverage[0], 0);
         s.block.coverage[0] = 1;
-        s.value(0, {0, 1, 1}) = 3;   // the value at the nearest point
+        s.value(0, {0, 1, 1}) = 3;  // the value at the nearest point
         EXPECT_EQ(s.check().isClean(), distance < kBounds.spillVoxels) << s.check().summary();
         if (distance > kBounds.spillVoxels) continue;
         s.value(0, {0, 1, 1}) = 3.001f;
@@ -116,7 +123,8 @@ TEST(CheckContract, CatchesAValueFiveUlpOff) {
 }
 
 TEST(CheckContract, AllowsForThePlaceBound) {
-    // A field of slope 2^24 a voxel: a place 2^-24 voxel off moves the value by 1, which is far above 4 ulp of small node values.
+    // A field of slope 2^24 a voxel: a place 2^-24 voxel off moves the value by 1, which is far above 4 ulp
+    // of small node values.
     TetMesh mesh = thinTetsMesh(ThinKind::cap, 1e-7, 1, 1, 4);
     for (Vec3d& p : mesh.points) p -= mesh.points[3];
     addRandomField(mesh, "random", FieldLocation::point, 1, 0, 1, 3);
@@ -140,10 +148,12 @@ TEST(CheckContract, CatchesTheWrongElementOfACellField) {
     EXPECT_EQ(s.check().wrongOwner, 1);
 }
 
-/// Two tets that overlap about the lattice point (1, 1, 1), deeper in the first, with different constant fields.
+/// Two tets that overlap about the lattice point (1, 1, 1), deeper in the first, with different constant
+/// fields.
 Setting twoOverlapping() {
     TetMesh mesh;
-    mesh.points = {{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}, {0.75, 0, 0}, {9.75, 0, 0}, {0.75, 9, 0}, {0.75, 0, 9}};
+    mesh.points = {{0, 0, 0},    {9, 0, 0},    {0, 9, 0},    {0, 0, 9},
+                   {0.75, 0, 0}, {9.75, 0, 0}, {0.75, 9, 0}, {0.75, 0, 9}};
     mesh.tets = {{0, 1, 2, 3}, {4, 5, 6, 7}};
     mesh.fields.push_back({"a", FieldLocation::point, 1, {1, 1, 1, 1, 2, 2, 2, 2}});
     mesh.fields.push_back({"b", FieldLocation::point, 1, {1, 1, 1, 1, 2, 2, 2, 2}});
@@ -163,7 +173,8 @@ TEST(CheckContract, CatchesChannelsOfDifferentOwners) {
     addElementIdField(mesh, "a");
     addElementIdField(mesh, "b");
     Setting s(std::move(mesh), Lattice::axisParallel(Vec3d(0), 1), {Vec3i(1), Vec3i(2)});
-    // All six elements meet at the middle of the cell: each is a right owner, but one of them for both fields.
+    // All six elements meet at the middle of the cell: each is a right owner, but one of them for both
+    // fields.
     for (int e = 0; e < 6; ++e) {
         s.value(0, Vec3i(1)) = s.value(1, Vec3i(1)) = float(e);
         EXPECT_TRUE(s.check().isClean()) << s.check().summary();
@@ -248,7 +259,7 @@ TEST(ContractSuite, SeesBlocksThatDiffer) {
     Setting s = jitteredBox();
     Block other = s.block;
     EXPECT_EQ(differences(other, s.block), 0);
-    other.values[other.offset({-1, -1, -1})] = 7;   // not covered: no matter
+    other.values[other.offset({-1, -1, -1})] = 7;  // not covered: no matter
     EXPECT_EQ(differences(other, s.block), 0);
     other.values[other.offset(kInside)] = std::nextafter(other.values[other.offset(kInside)], 9.0f);
     EXPECT_EQ(differences(other, s.block), 1);

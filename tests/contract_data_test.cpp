@@ -1,4 +1,5 @@
-// The contract on real meshes: those bundled with the project, and those of the shared folder where it is present.
+// The contract on real meshes: those bundled with the project, and those of the shared folder where it is
+// present.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +22,8 @@ std::vector<fs::path> meshFiles() {
     for (const char* folder : {TESSERA_DATA_DIR, TESSERA_SHARED_DATA_DIR}) {
         std::error_code error;
         for (const auto& entry : fs::recursive_directory_iterator(folder, error))
-            if (std::find(std::begin(kExtensions), std::end(kExtensions), entry.path().extension()) != std::end(kExtensions))
+            if (std::find(std::begin(kExtensions), std::end(kExtensions), entry.path().extension()) !=
+                std::end(kExtensions))
                 files.push_back(entry.path());
     }
     std::sort(files.begin(), files.end());
@@ -73,14 +75,16 @@ INSTANTIATE_TEST_SUITE_P(All, ContractOnData,
                          [](const testing::TestParamInfo<OnFile>& param) {
                              const fs::path& file = std::get<1>(param.param);
                              std::string name = std::string(std::get<0>(param.param)->name()) + "_" +
-                                                file.parent_path().filename().string() + "_" + file.filename().string();
+                                                file.parent_path().filename().string() + "_" +
+                                                file.filename().string();
                              for (char& c : name)
                                  if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
                              return name + "_" + std::to_string(param.index);
                          });
 
 TEST(SharedData, IsThere) {
-    if (!fs::exists(TESSERA_SHARED_DATA_DIR)) GTEST_SKIP() << "no shared meshes at " << TESSERA_SHARED_DATA_DIR;
+    if (!fs::exists(TESSERA_SHARED_DATA_DIR))
+        GTEST_SKIP() << "no shared meshes at " << TESSERA_SHARED_DATA_DIR;
     EXPECT_GE(meshFiles().size(), 20u);
 }
 

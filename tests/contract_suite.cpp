@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
@@ -30,7 +31,9 @@ double scale() {
     return value;
 }
 
-int scaledPoints(int points) { return std::max(5, int(std::lround(points * std::cbrt(scale())))); }
+int scaledPoints(int points) {
+    return std::max(5, int(std::lround(points * std::cbrt(scale()))));
+}
 
 namespace {
 
@@ -63,7 +66,8 @@ TetMesh alignedThinTets() {
         if (i % 2 == 0)
             mesh.points.insert(mesh.points.end(), {{0, y, z}, {3, y, z}, {0, y + thin, z}, {0, y, z + thin}});
         else
-            mesh.points.insert(mesh.points.end(), {{0, y, z}, {3, y + thin, z}, {1, y, z + 0.25}, {2, y - thin, z - 0.25}});
+            mesh.points.insert(mesh.points.end(),
+                               {{0, y, z}, {3, y + thin, z}, {1, y, z + 0.25}, {2, y - thin, z - 0.25}});
         mesh.tets.push_back({n, n + 1, n + 2, n + 3});
     }
     return mesh;
@@ -71,17 +75,45 @@ TetMesh alignedThinTets() {
 
 std::vector<MeshCase> makeMeshCases() {
     return {
-        {"BoxOfKuhnTets", [] { return boxMesh({.cells = {4, 3, 2}, .sizeWorld = {4, 3, 2}}); }, 0.25},
-        {"BoxOfFiveTetsACell", [] { return boxMesh({.cells = {3, 3, 3}, .sizeWorld = {3, 3, 3}, .isFiveSplit = true}); }, 0.25},
-        {"JitteredBox", [] { return boxMesh({.cells = {6, 6, 6}, .jitter = 0.25, .seed = 7}); }, 0},
-        {"TurnedJitteredBox", [] { return turnedMesh(boxMesh({.cells = {5, 5, 5}, .jitter = 0.25}), 3e-7, {1e-6, 0, -2e-6}); }, 0},
-        {"BoxOfThirds", [] { return boxMesh({.cells = {3, 3, 3}, .originWorld = {0.1, 0.2, 0.3}}); }, 1.0 / 12},
-        {"BoxFarFromTheOrigin", [] { return boxMesh({.cells = {3, 3, 3}, .originWorld = {1e6, -2e6, 3e6}, .jitter = 0.2}); }, 0},
+        {"BoxOfKuhnTets",
+         [] {
+             return boxMesh({.cells = {4, 3, 2}, .sizeWorld = {4, 3, 2}});
+         },
+         0.25},
+        {"BoxOfFiveTetsACell",
+         [] {
+             return boxMesh({.cells = {3, 3, 3}, .sizeWorld = {3, 3, 3}, .isFiveSplit = true});
+         },
+         0.25},
+        {"JitteredBox",
+         [] {
+             return boxMesh({.cells = {6, 6, 6}, .jitter = 0.25, .seed = 7});
+         },
+         0},
+        {"TurnedJitteredBox",
+         [] {
+             return turnedMesh(boxMesh({.cells = {5, 5, 5}, .jitter = 0.25}), 3e-7, {1e-6, 0, -2e-6});
+         },
+         0},
+        {"BoxOfThirds",
+         [] {
+             return boxMesh({.cells = {3, 3, 3}, .originWorld = {0.1, 0.2, 0.3}});
+         },
+         1.0 / 12},
+        {"BoxFarFromTheOrigin",
+         [] {
+             return boxMesh({.cells = {3, 3, 3}, .originWorld = {1e6, -2e6, 3e6}, .jitter = 0.2});
+         },
+         0},
         {"Sphere", [] { return sphereMesh(6); }, 0},
         {"GradedBox", [] { return gradedBoxMesh(12, 3, 0.2, 3); }, 0},
         {"GradedDelaunay", [] { return gradedDelaunayMesh(500, 2.2, 5); }, 0},
         {"BoundaryLayers", [] { return boundaryLayerMesh(3, 1e-5); }, 0.125},
-        {"TurnedBoundaryLayers", [] { return turnedMesh(boundaryLayerMesh(3, 1e-6), 1, {0, 0, 0}); }, 0},
+        {"TurnedBoundaryLayers",
+         [] {
+             return turnedMesh(boundaryLayerMesh(3, 1e-6), 1, {0, 0, 0});
+         },
+         0},
         {"HangingNodes", [] { return hangingNodeMesh(2, 3); }, 0.125},
         {"ThinTetsOfAspect1e2", [] { return loneThinTets(1e-2); }, 0},
         {"ThinTetsOfAspect1e4", [] { return loneThinTets(1e-4); }, 0},
@@ -96,11 +128,17 @@ std::vector<MeshCase> makeMeshCases() {
         {"TetsWithIntegerNodes", [] { return integerTetsMesh(5, 12, 21); }, 1},
         {"OverlappingTets", [] { return overlappingMesh(60, 31); }, 0},
         {"FlatAndInvertedElements", flatAndInverted, 1.0 / 12},
-        {"ManyElementsInOneVoxel", [] { return dustMesh({0.5, 0.5, 0.5}, 0.02, 1e-2, 4000, 41); }, 0},
+        {"ManyElementsInOneVoxel",
+         [] {
+             return dustMesh({0.5, 0.5, 0.5}, 0.02, 1e-2, 4000, 41);
+         },
+         0},
     };
 }
 
-Lattice cubic(const Vec3d& origin, double spacing) { return Lattice::axisParallel(origin, spacing); }
+Lattice cubic(const Vec3d& origin, double spacing) {
+    return Lattice::axisParallel(origin, spacing);
+}
 
 /// Lattice points over the bounds and `margin` points more on each side.
 IndexBox over(const Box3d& bounds, const Lattice& lattice, int margin) {
@@ -125,7 +163,8 @@ LatticeCase cutPlane(const std::string& name, const Box3d& bounds, int points, d
     const double cx = std::cos(aboutX), sx = std::sin(aboutX), cz = std::cos(aboutZ), sz = std::sin(aboutZ);
     const Vec3d u{cz, sz, 0}, v{-sz * cx, cz * cx, sx}, w{sz * sx, -cz * sx, cx};
     const int half = points / 2 + 1;
-    return {name, {centre, spacing * u, spacing * v, spacing * w}, {{-half, -half, 0}, {half + 1, half + 1, 1}}};
+    return {
+        name, {centre, spacing * u, spacing * v, spacing * w}, {{-half, -half, 0}, {half + 1, half + 1, 1}}};
 }
 
 }  // namespace
@@ -162,7 +201,8 @@ std::vector<LatticeCase> latticesAbout(const TetMesh& mesh, double alignedSpacin
     // The same places as the fine lattice has, from an origin far away.
     const double fine = longest * 0x1p-9;
     const Vec3i far = Vec3i(glm::round((focus - bounds.min) / fine)) + 100000;
-    cases.push_back({"far origin", cubic(bounds.min - fine * 100000.0, fine), {far + about.min, far + about.max}});
+    cases.push_back(
+        {"far origin", cubic(bounds.min - fine * 100000.0, fine), {far + about.min, far + about.max}});
     cases.push_back({"left handed", {focus, {0, h / 4, 0}, {h / 4, 0, 0}, {0, 0, h / 4}}, about});
     cases.push_back(cutPlane("cut plane", bounds, 2 * points, 0.5, 1.1));
     cases.push_back(cutPlane("cut plane across an axis", bounds, 2 * points, std::numbers::pi / 2, 0));
@@ -172,8 +212,9 @@ std::vector<LatticeCase> latticesAbout(const TetMesh& mesh, double alignedSpacin
 void addTestFields(TetMesh& mesh) {
     const Vec3d origin = mesh.points.empty() ? Vec3d(0) : mesh.points[0];
     const int wavy = addPointField(mesh, "wavy", {[&](const Vec3d& p) { return wavyField(p - origin); }});
-    addPointField(mesh, "linear", {[&](const Vec3d& p) { return p.x - origin.x; },
-                                   [&](const Vec3d& p) { return 3 * p.y - 2 * p.z + 1; }});
+    addPointField(mesh, "linear",
+                  {[&](const Vec3d& p) { return p.x - origin.x; },
+                   [&](const Vec3d& p) { return 3 * p.y - 2 * p.z + 1; }});
     addPointField(mesh, "constant", {[](const Vec3d&) { return 0.1; }});
     addRandomField(mesh, "pressure", FieldLocation::point, 1, 101325, 1, 51);
     addRandomField(mesh, "huge", FieldLocation::point, 1, 0, 1e30, 52);
@@ -197,14 +238,13 @@ std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::
     std::vector<int> calls(boxes.size(), 0);
     std::mutex mutex;
     const auto bound = resampler.bind(mesh, fields, sampling.target);
-    bound->resample(
-        lattice, boxes,
-        [&](std::size_t b, const Block& block) {
-            const std::lock_guard lock(mutex);
-            blocks.at(b) = block;
-            ++calls.at(b);
-        },
-        {.threads = sampling.threads});
+    bound->resample(lattice, boxes,
+                    [&](std::size_t b, const Block& block) {
+                        const std::lock_guard lock(mutex);
+                        blocks.at(b) = block;
+                        ++calls.at(b);
+                    },
+                    {.threads = sampling.threads});
     for (const int count : calls) EXPECT_EQ(count, 1) << "every block is given out once";
     return blocks;
 }
@@ -235,6 +275,21 @@ std::int64_t differences(const Block& part, const Block& whole) {
     return count;
 }
 
+namespace {
+
+std::string describe(const LatticeCase& at) {
+    const auto text = [](const Vec3d& v) {
+        char buffer[100];
+        std::snprintf(buffer, sizeof buffer, " (%.17g %.17g %.17g)", v.x, v.y, v.z);
+        return std::string(buffer);
+    };
+    return "lattice: " + at.name + ", origin" + text(at.lattice.originWorld) + ", axes" +
+           text(at.lattice.uWorld) + text(at.lattice.vWorld) + text(at.lattice.wWorld) + ", box" +
+           text(Vec3d(at.box.min)) + text(Vec3d(at.box.max));
+}
+
+}  // namespace
+
 ContractReport expectContract(const Resampler& resampler, const TetMesh& mesh, const LatticeCase& at) {
     const std::vector<int> fields = allFields(mesh);
     const ContractBounds bounds{resampler.spillBoundVoxels(), resampler.placeBoundVoxels()};
@@ -242,7 +297,7 @@ ContractReport expectContract(const Resampler& resampler, const TetMesh& mesh, c
     const Oracle oracle(mesh, at.lattice);
     const ReferenceBlock reference = referenceBlock(oracle, at.box, {.toleranceVoxels = bounds.spillVoxels});
     const ContractReport report = checkContract(blocks[0], reference, oracle, fields, bounds);
-    EXPECT_TRUE(report.isClean()) << "lattice: " << at.name << "\n  " << report.summary();
+    EXPECT_TRUE(report.isClean()) << describe(at) << "\n  " << report.summary();
     return report;
 }
 
@@ -265,7 +320,8 @@ TetMesh withCompany(const TetMesh& mesh, const LatticeCase& at) {
     appendMesh(larger, company);
     larger.fields = mesh.fields;
     for (Field& field : larger.fields) {
-        const std::int64_t items = field.location == FieldLocation::point ? larger.nodeCount() : larger.elementCount();
+        const std::int64_t items =
+            field.location == FieldLocation::point ? larger.nodeCount() : larger.elementCount();
         field.values.resize(std::size_t(items * field.components), 1.0);
     }
     return larger;
@@ -274,7 +330,7 @@ TetMesh withCompany(const TetMesh& mesh, const LatticeCase& at) {
 }  // namespace
 
 void expectDeterministic(const Resampler& resampler, const TetMesh& mesh, const LatticeCase& at) {
-    SCOPED_TRACE("lattice: " + at.name);
+    SCOPED_TRACE(describe(at));
     const std::vector<int> fields = allFields(mesh);
     const auto run = [&](std::span<const IndexBox> boxes, const Sampling& sampling) {
         return sample(resampler, mesh, fields, at.lattice, boxes, sampling);

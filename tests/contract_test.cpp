@@ -64,7 +64,8 @@ TEST_P(Contract, GivesTheSameBitsAlways) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, Contract, testing::Combine(testing::ValuesIn(subjects()), testing::ValuesIn(meshCases())),
+INSTANTIATE_TEST_SUITE_P(All, Contract,
+                         testing::Combine(testing::ValuesIn(subjects()), testing::ValuesIn(meshCases())),
                          [](const testing::TestParamInfo<OnMesh>& param) {
                              return nameOf(*std::get<0>(param.param)) + "On" + std::get<1>(param.param).name;
                          });
@@ -105,7 +106,8 @@ TEST_P(ContractOf, CoversTheClosedBoxExactly) {
 }
 
 TEST_P(ContractOf, TakesLatticePointsAsRealNumbers) {
-    // An edge of tet i runs from 0 to the first double at or beyond i times the double 0.1, which often isn't their rounded product.
+    // An edge of tet i runs from 0 to the first double at or beyond i times the double 0.1, which often isn't
+    // their rounded product.
     const Lattice lattice{Vec3d(0), {0.1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     constexpr int kTets = 59;
     TetMesh mesh;
@@ -134,7 +136,8 @@ TEST_P(ContractOf, ReproducesALinearFieldExactlyAtNodes) {
     TetMesh mesh = boxMesh({.cells = {3, 4, 5}, .sizeWorld = {3, 4, 5}});
     addPointField(mesh, "sum", {[](const Vec3d& p) { return p.x + 10 * p.y + 100 * p.z; }});
     const IndexBox box{{0, 0, 0}, {4, 5, 6}};
-    const Block block = resampleBlock(*GetParam(), mesh, std::vector{0}, Lattice::axisParallel(Vec3d(0), 1), box);
+    const Block block =
+        resampleBlock(*GetParam(), mesh, std::vector{0}, Lattice::axisParallel(Vec3d(0), 1), box);
     Vec3i p;
     for (p.z = 0; p.z < 6; ++p.z)
         for (p.y = 0; p.y < 5; ++p.y)
@@ -148,7 +151,8 @@ TEST_P(ContractOf, ReproducesALinearFieldExactlyAtNodes) {
 TEST_P(ContractOf, LeavesAnEmptyMeshAndAnEmptyBoxUncovered) {
     const IndexBox box{Vec3i(0), Vec3i(3)};
     const Lattice lattice = Lattice::axisParallel(Vec3d(0), 1);
-    EXPECT_EQ(resampleBlock(*GetParam(), TetMesh{}, {}, lattice, box).coverage, std::vector<std::uint8_t>(27, 0));
+    EXPECT_EQ(resampleBlock(*GetParam(), TetMesh{}, {}, lattice, box).coverage,
+              std::vector<std::uint8_t>(27, 0));
     TetMesh flat;
     flat.points = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {1, 1, 0}};
     flat.tets = {{0, 1, 2, 3}};
@@ -167,7 +171,9 @@ TEST_P(ContractOf, CoversATenthOfAMillionElementsInOneVoxel) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ContractOf, testing::ValuesIn(subjects()),
-                         [](const testing::TestParamInfo<const Resampler*>& param) { return nameOf(*param.param); });
+                         [](const testing::TestParamInfo<const Resampler*>& param) {
+                             return nameOf(*param.param);
+                         });
 
 }  // namespace
 }  // namespace tessera::contract

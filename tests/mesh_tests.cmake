@@ -1,1 +1,5 @@
 tessera_test(mesh_test LINK mesh PRIVATE_LINK tessera_gmp)
+tessera_test(split_test LINK mesh)
+if(TESSERA_BUILD_IO)
+  tessera_test(read_mesh_test LINK io)
+endif()

@@ -13,7 +13,8 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-float valueOf(const Oracle& oracle, const Field& field, int component, std::int32_t element, const ExactWeights& weights) {
+float valueOf(const Oracle& oracle, const Field& field, int component, std::int32_t element,
+              const ExactWeights& weights) {
     if (field.location == FieldLocation::cell) return float(field.at(element, component));
     float low = std::numeric_limits<float>::infinity(), high = -low;
     for (const std::int32_t n : oracle.mesh().tets[std::size_t(element)]) {
@@ -26,10 +27,11 @@ float valueOf(const Oracle& oracle, const Field& field, int component, std::int3
 
 class BoundOracle : public BoundResampler {
   public:
-    BoundOracle(const TetMesh& mesh, std::span<const int> fields) : mesh_(&mesh), fields_(fields.begin(), fields.end()) {}
+    BoundOracle(const TetMesh& mesh, std::span<const int> fields)
+        : mesh_(&mesh), fields_(fields.begin(), fields.end()) {}
 
-    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes, const BlockSink& sink,
-                                const Execution& execution) override {
+    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                const BlockSink& sink, const Execution& execution) override {
         const Oracle oracle(*mesh_, lattice);
         parallelFor(execution, std::int64_t(boxes.size()), [&](std::int64_t b) {
             const ReferenceBlock reference =
@@ -55,7 +57,8 @@ class BoundOracle : public BoundResampler {
         return block;
     }
 
-    void fillPoint(const Oracle& oracle, const ReferenceBlock& reference, const Vec3i& p, Block& block) const {
+    void fillPoint(const Oracle& oracle, const ReferenceBlock& reference, const Vec3i& p,
+                   Block& block) const {
         const std::size_t offset = block.offset(p);
         Candidate owner;
         owner.depthVoxels = -1;
@@ -66,7 +69,8 @@ class BoundOracle : public BoundResampler {
         for (const int f : fields_) {
             const Field& field = mesh_->fields[std::size_t(f)];
             for (int c = 0; c < field.components; ++c)
-                block.values[channel++ * block.count() + offset] = valueOf(oracle, field, c, owner.element, weights);
+                block.values[channel++ * block.count() + offset] =
+                    valueOf(oracle, field, c, owner.element, weights);
         }
     }
 

@@ -4,8 +4,8 @@
 
 namespace tessera::contract {
 
-/// A slow resampler made of the oracle itself: the deepest element that contains the point owns it, the lowest index among equals.
-/// It shows that the suite accepts a right answer.
+/// A slow resampler made of the oracle itself: the deepest element that contains the point owns it, the
+/// lowest index among equals. It shows that the suite accepts a right answer.
 class OracleResampler : public Resampler {
   public:
     std::string_view name() const override { return "oracle"; }

@@ -28,8 +28,8 @@ TEST(Oracle, ContainsTheClosedElement) {
     const Oracle oracle(mesh, kQuarter);
     EXPECT_TRUE(oracle.contains(0, {0, 0, 0}));
     EXPECT_TRUE(oracle.contains(0, {4, 0, 0}));
-    EXPECT_TRUE(oracle.contains(0, {2, 1, 1}));   // on the slanted face
-    EXPECT_TRUE(oracle.contains(0, {2, 2, 0}));   // on an edge
+    EXPECT_TRUE(oracle.contains(0, {2, 1, 1}));  // on the slanted face
+    EXPECT_TRUE(oracle.contains(0, {2, 2, 0}));  // on an edge
     EXPECT_TRUE(oracle.contains(0, {1, 1, 1}));
     EXPECT_FALSE(oracle.contains(0, {2, 2, 1}));
     EXPECT_FALSE(oracle.contains(0, {-1, 0, 0}));
@@ -47,7 +47,8 @@ TEST(Oracle, TellsPointsOneUlpApart) {
 }
 
 TEST(Oracle, TakesLatticePointsAsRealNumbers) {
-    // The double 0.1 is above one tenth, the double 0.3 below three tenths: three steps of 0.1 lie beyond the double 0.3.
+    // The double 0.1 is above one tenth, the double 0.3 below three tenths: three steps of 0.1 lie beyond the
+    // double 0.3.
     TetMesh mesh = cornerTet();
     mesh.points[1].x = 0.3;
     const Lattice lattice = Lattice::axisParallel(Vec3d(0), 0.1);
@@ -117,12 +118,14 @@ TEST(Oracle, DepthIsTheDistanceToTheNearestFacePlane) {
 }
 
 TEST(Oracle, NearestPointMeetsTheConditionOfOptimality) {
-    // q is the nearest point of a convex hull to p exactly when no node lies beyond the plane through q across p - q.
+    // q is the nearest point of a convex hull to p exactly when no node lies beyond the plane through q
+    // across p - q.
     Random random(5);
     for (int trial = 0; trial < 200; ++trial) {
         const double squeeze = std::pow(10.0, -random.below(13));
         TetMesh mesh;
-        for (int i = 0; i < 4; ++i) mesh.points.push_back(8.0 * random.place() * Vec3d(1, 1, squeeze) + Vec3d(0, 0, 4));
+        for (int i = 0; i < 4; ++i)
+            mesh.points.push_back(8.0 * random.place() * Vec3d(1, 1, squeeze) + Vec3d(0, 0, 4));
         mesh.tets = {{0, 1, 2, 3}};
         const Oracle oracle(mesh, kUnit);
         if (oracle.volumeSign(0) == 0) continue;
@@ -130,7 +133,8 @@ TEST(Oracle, NearestPointMeetsTheConditionOfOptimality) {
         const ExactNearest nearest = oracle.nearest(0, p);
         std::array<mpq_class, 3> q;
         for (int a = 0; a < 3; ++a)
-            for (std::size_t i = 0; i < 4; ++i) q[std::size_t(a)] += nearest.weights[i] * mpq_class(mesh.points[i][a]);
+            for (std::size_t i = 0; i < 4; ++i)
+                q[std::size_t(a)] += nearest.weights[i] * mpq_class(mesh.points[i][a]);
         mpq_class square, sum;
         for (std::size_t i = 0; i < 4; ++i) {
             mpq_class beyond;
@@ -148,7 +152,7 @@ TEST(Oracle, NearestPointMeetsTheConditionOfOptimality) {
 
 TEST(Oracle, InterpolatesALinearFieldAndItsGradientExactly) {
     TetMesh mesh = overlappingMesh(20, 3);
-    for (Vec3d& p : mesh.points) p = glm::round(p * 1024.0);   // so that node values are exact
+    for (Vec3d& p : mesh.points) p = glm::round(p * 1024.0);  // so that node values are exact
     const int f = addPointField(mesh, "f", {[](const Vec3d& p) { return 2 * p.x - 3 * p.y + 5 * p.z + 7; }});
     const Lattice lattice{{3, 4, 5}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
     const Oracle oracle(mesh, lattice);
@@ -168,7 +172,8 @@ TEST(Oracle, ApproximateBarycentricsFollowTheExactOnes) {
         if (oracle.volumeSign(e) == 0) continue;
         const auto rough = oracle.approximateBarycentrics(e, {1, -2, 3});
         const ExactWeights exact = oracle.barycentrics(e, {1, -2, 3});
-        for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(rough[i], exact[i].get_d(), std::abs(rough[i]) * 0x1p-50);
+        for (std::size_t i = 0; i < 4; ++i)
+            EXPECT_NEAR(rough[i], exact[i].get_d(), std::abs(rough[i]) * 0x1p-50);
     }
 }
 
@@ -206,14 +211,15 @@ TEST(ReferenceBlock, AllowsSpillUpToTheToleranceExactly) {
     // The point (2, 0, 0) is one unit from the tet: exactly the tolerance, then one ulp of 1 more.
     TetMesh mesh = cornerTet();
     const auto mayCover = [&](double tolerance) {
-        return referenceBlock(Oracle(mesh, kUnit), {{2, 0, 0}, {3, 1, 1}}, {.toleranceVoxels = tolerance}).mayCover(0);
+        return referenceBlock(Oracle(mesh, kUnit), {{2, 0, 0}, {3, 1, 1}}, {.toleranceVoxels = tolerance})
+            .mayCover(0);
     };
     EXPECT_TRUE(mayCover(1));
     EXPECT_FALSE(mayCover(std::nextafter(1.0, 0.0)));
     // Beyond a sharp corner the planes are near, the element is not.
     mesh.points = {{0, 0, 0}, {1, 1e-3, 0}, {1, -1e-3, 1e-3}, {1, 0, -1e-3}};
-    const ReferenceBlock sharp = referenceBlock(Oracle(mesh, Lattice::axisParallel({-0.5, 0, 0}, 1)), {{0, 0, 0}, {1, 1, 1}},
-                                                {.toleranceVoxels = 0.01});
+    const ReferenceBlock sharp = referenceBlock(Oracle(mesh, Lattice::axisParallel({-0.5, 0, 0}, 1)),
+                                                {{0, 0, 0}, {1, 1, 1}}, {.toleranceVoxels = 0.01});
     EXPECT_FALSE(sharp.mayCover(0));
 }
 
@@ -222,7 +228,8 @@ TEST(ReferenceBlock, SphereHasItsVolume) {
     const double h = 1.0 / 16;
     const ReferenceBlock reference =
         referenceBlock(Oracle(mesh, Lattice::axisParallel(Vec3d(h / 3), h)), {Vec3i(-18), Vec3i(18)});
-    const double volume = double(std::count(reference.mustCover.begin(), reference.mustCover.end(), 1)) * h * h * h;
+    const double volume =
+        double(std::count(reference.mustCover.begin(), reference.mustCover.end(), 1)) * h * h * h;
     EXPECT_NEAR(volume, 4.0 / 3 * M_PI, 0.03 * volume);
 }
 
@@ -233,7 +240,8 @@ void expectSame(const ReferenceBlock& a, const ReferenceBlock& b) {
         EXPECT_EQ(a.candidates[i].element, b.candidates[i].element);
         EXPECT_EQ(a.candidates[i].contains, b.candidates[i].contains);
         EXPECT_NEAR(a.candidates[i].depthVoxels, b.candidates[i].depthVoxels, 1e-8);
-        EXPECT_NEAR(a.candidates[i].distanceVoxels, b.candidates[i].distanceVoxels, 0.11 * b.candidates[i].distanceVoxels);
+        EXPECT_NEAR(a.candidates[i].distanceVoxels, b.candidates[i].distanceVoxels,
+                    0.11 * b.candidates[i].distanceVoxels);
     }
 }
 
@@ -251,12 +259,14 @@ TEST(ReferenceBlock, FilterChangesNothing) {
         const Box3d bounds = mesh.boundsWorld();
         const double h = bounds.size().x / 8;
         const Lattice turned{bounds.min, {h, h / 3, 0}, {-h / 3, h, 0}, {0, h / 5, h}};
-        for (const Lattice& lattice : {Lattice::axisParallel(bounds.min, h), Lattice::axisParallel(bounds.min + step, h), turned})
+        for (const Lattice& lattice :
+             {Lattice::axisParallel(bounds.min, h), Lattice::axisParallel(bounds.min + step, h), turned})
             for (const double tolerance : {1.0 / 4096, 0.25}) {
                 const Oracle oracle(mesh, lattice);
                 const IndexBox box{Vec3i(-2), Vec3i(11)};
                 const auto fast = referenceBlock(oracle, box, {.toleranceVoxels = tolerance});
-                const auto slow = referenceBlock(oracle, box, {.toleranceVoxels = tolerance, .isUnfiltered = true}, {.threads = 2});
+                const auto slow = referenceBlock(
+                    oracle, box, {.toleranceVoxels = tolerance, .isUnfiltered = true}, {.threads = 2});
                 expectSame(fast, slow);
                 EXPECT_LE(fast.exactPairs, slow.exactPairs);
             }
@@ -265,7 +275,8 @@ TEST(ReferenceBlock, FilterChangesNothing) {
 
 TEST(Generators, KuhnAndFiveTetBoxesFillTheBox) {
     for (const bool isFiveSplit : {false, true}) {
-        const TetMesh mesh = boxMesh({.cells = {3, 4, 5}, .sizeWorld = {3, 4, 5}, .isFiveSplit = isFiveSplit});
+        const TetMesh mesh =
+            boxMesh({.cells = {3, 4, 5}, .sizeWorld = {3, 4, 5}, .isFiveSplit = isFiveSplit});
         EXPECT_EQ(mesh.elementCount(), 60 * (isFiveSplit ? 5 : 6));
         mpq_class volume;
         const Oracle oracle(mesh, kUnit);
@@ -277,8 +288,8 @@ TEST(Generators, KuhnAndFiveTetBoxesFillTheBox) {
         }
         EXPECT_EQ(volume, 60);
         // Each inner point of a conforming mesh off all faces has one element.
-        const ReferenceBlock reference =
-            referenceBlock(Oracle(mesh, Lattice::axisParallel({0.11, 0.23, 0.37}, 0.5)), {Vec3i(0), {5, 7, 9}});
+        const ReferenceBlock reference = referenceBlock(
+            Oracle(mesh, Lattice::axisParallel({0.11, 0.23, 0.37}, 0.5)), {Vec3i(0), {5, 7, 9}});
         EXPECT_EQ(reference.candidates.size(), 5u * 7 * 9);
     }
 }
@@ -290,13 +301,15 @@ TEST(Generators, DelaunaySpheresAreEmptyAndElementsTileTheHull) {
         std::array<Vec3d, 4> at;
         for (std::size_t i = 0; i < 4; ++i) at[i] = mesh.points[std::size_t(tet[i])];
         const Vec3d a = at[1] - at[0], b = at[2] - at[0], c = at[3] - at[0];
-        const Vec3d centre = (dot(a, a) * cross(b, c) + dot(b, b) * cross(c, a) + dot(c, c) * cross(a, b)) / (2 * dot(a, cross(b, c)));
+        const Vec3d centre = (dot(a, a) * cross(b, c) + dot(b, b) * cross(c, a) + dot(c, c) * cross(a, b)) /
+                             (2 * dot(a, cross(b, c)));
         const double radius = glm::length(centre);
-        if (radius > 1e3) continue;   // the centre isn't known well enough in double
-        for (const Vec3d& p : mesh.points) EXPECT_GT(glm::length(p - at[0] - centre), radius * (1 - 1e-9) - 1e-9);
+        if (radius > 1e3) continue;  // the centre isn't known well enough in double
+        for (const Vec3d& p : mesh.points)
+            EXPECT_GT(glm::length(p - at[0] - centre), radius * (1 - 1e-9) - 1e-9);
     }
-    const ReferenceBlock reference =
-        referenceBlock(Oracle(mesh, Lattice::axisParallel({0.301, 0.307, 0.303}, 0.02)), {Vec3i(0), Vec3i(20)});
+    const ReferenceBlock reference = referenceBlock(
+        Oracle(mesh, Lattice::axisParallel({0.301, 0.307, 0.303}, 0.02)), {Vec3i(0), Vec3i(20)});
     for (std::size_t i = 0; i < reference.mustCover.size(); ++i) EXPECT_EQ(reference.mustCover[i], 1);
     EXPECT_LT(reference.candidates.size(), reference.mustCover.size() + 30);
 }
@@ -306,8 +319,9 @@ TEST(Generators, GradedBoxHasAVolumeRatioOfAMillion) {
     double least = 1, most = 0;
     for (const auto& t : mesh.tets) {
         const Vec3d a = mesh.points[std::size_t(t[0])];
-        const double v = std::abs(dot(cross(mesh.points[std::size_t(t[1])] - a, mesh.points[std::size_t(t[2])] - a),
-                                      mesh.points[std::size_t(t[3])] - a));
+        const double v =
+            std::abs(dot(cross(mesh.points[std::size_t(t[1])] - a, mesh.points[std::size_t(t[2])] - a),
+                         mesh.points[std::size_t(t[3])] - a));
         least = std::min(least, v), most = std::max(most, v);
     }
     EXPECT_GT(most / least, 1e6);

@@ -760,7 +760,7 @@ TEST_F(VdbFileTest, FilesOfOtherProgramsGiveTheirLattice) {
 
     // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never in a crash.
     const std::string good = readBytes(file("other.vdb"));
-    for (std::uint32_t i = 0; i < 200; ++i) {
+    for (std::uint32_t i = 0; i < 60; ++i) {
         std::string bad = good;
         for (std::uint32_t k = 0; k < 3; ++k) bad[57 + scramble(i * 3 + k) % 400] = char(scramble(i + k) & 255);
         writeBytes(file("bad.vdb"), bad);

@@ -1,5 +1,181 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <filesystem>
+#include <numeric>
+
+#include "base/error.h"
 #include "commands.h"
+#include "io/atomic_file.h"
+#include "io/image.h"
+#include "io/read_mesh.h"
+#include "io/vdb_file.h"
+#include "report_text.h"
+
 namespace tessera {
-void addPictureOptions(CLI::App& , PictureArguments& ) {}
-int runPicture(const PictureArguments& ) { return 0; }
+
+namespace {
+
+constexpr double kMargin = 0.02;   // around the covered points, as a share of their box
+
+/// Box of the covered lattice points.
+Box3d coveredBounds(const VdbFile& file) {
+    Box3d bounds;
+    const int n = file.store.tilesPerEdge();
+    for (std::size_t leaf = 0; leaf < file.tree.leafCount(); ++leaf) {
+        const BrickKey& key = file.tree.leaves()[leaf];
+        const Lattice lattice = file.tree.lattice(key.level);
+        const Vec3i first = file.tree.ownedPoints(key).min;
+        for (int t = 0; t < file.store.tileCount(); ++t) {
+            const Tile* tile = file.store.tile(leaf, t);
+            if (!tile) continue;
+            const Vec3i corner = first + kTileSize * Vec3i(t / (n * n), t / n % n, t % n);
+            for (int offset = 0; offset < kTilePoints; ++offset)
+                if (tile->covered(offset))
+                    bounds.include(lattice.worldFromIndex(Vec3d(corner + Vec3i(offset / 64, offset / 8 % 8, offset % 8))));
+        }
+    }
+    return bounds;
 }
+
+const OutputField& chooseField(const VdbFile& file, const std::string& name) {
+    std::string there;
+    for (const OutputField& field : file.fields) {
+        if (field.name == name || (name.empty() && &field == &file.fields.front())) return field;
+        there += (there.empty() ? "" : ", ") + field.name;
+    }
+    throw InputError(fmt::format("no field named '{}'; there are: {}", name, there.empty() ? "none" : there));
+}
+
+/// What a cell that is partly outside the mesh is filled from: the mesh itself, or, without it, fields without values.
+struct Outside {
+    TetMesh mesh;
+    std::vector<int> fields;
+};
+
+Outside readOutside(const PictureArguments& arguments, const VdbFile& file, const Execution& execution) {
+    Outside outside;
+    if (arguments.mesh.empty()) {
+        for (const OutputField& field : file.fields) outside.mesh.fields.push_back({field.name, FieldLocation::point, field.components, {}});
+        outside.fields.resize(file.fields.size());
+        std::iota(outside.fields.begin(), outside.fields.end(), 0);
+        return outside;
+    }
+    ReadOptions options;
+    for (const OutputField& field : file.fields) options.fields.push_back(field.sourceName);
+    outside.mesh = readMesh(arguments.mesh, options, execution).mesh;
+    for (const OutputField& output : file.fields) {
+        const auto& fields = outside.mesh.fields;
+        const auto found = std::find_if(fields.begin(), fields.end(), [&](const Field& field) {
+            return field.name == output.sourceName && field.components == output.components &&
+                   (field.location == FieldLocation::point) == (output.location == "point");
+        });
+        if (found == fields.end()) throw InputError(fmt::format("{} has no field '{}' as the .vdb file has", arguments.mesh, output.sourceName));
+        outside.fields.push_back(int(found - fields.begin()));
+    }
+    return outside;
+}
+
+/// One component, or the length of a vector when none is asked for.
+ScalarImage sampleField(const VdbFile& file, const OutputField& field, const PictureArguments& arguments,
+                        const Reconstruction& reconstruction, const SliceOptions& slice, const Execution& execution) {
+    if (arguments.component && *arguments.component >= field.components)
+        throw InputError(fmt::format("--component: {} has {} components, counted from 0, got {}", field.name, field.components, *arguments.component));
+    if (arguments.component || field.components == 1)
+        return sampleSlice(file.tree, reconstruction, field.firstChannel + arguments.component.value_or(0), slice, execution);
+    ScalarImage image = sampleSlice(file.tree, reconstruction, field.firstChannel, slice, execution);
+    for (float& value : image.values) value *= value;
+    for (int c = 1; c < field.components; ++c) {
+        const ScalarImage more = sampleSlice(file.tree, reconstruction, field.firstChannel + c, slice, execution);
+        for (std::size_t i = 0; i < image.values.size(); ++i) image.values[i] += more.values[i] * more.values[i];
+    }
+    for (float& value : image.values) value = std::sqrt(value);
+    return image;
+}
+
+SliceOptions sliceOptions(const PictureArguments& arguments, const VdbFile& file) {
+    SliceOptions slice;
+    slice.axis = arguments.axis == "x" ? 0 : arguments.axis == "y" ? 1 : 2;
+    slice.pixels = arguments.pixels;
+    slice.outlines = arguments.bricks;
+    if (!arguments.bounds.empty()) {
+        slice.boundsWorld = parseBounds(arguments.bounds);
+    } else {
+        const Box3d covered = coveredBounds(file);
+        if (covered.empty()) throw InputError(fmt::format("{}: no voxel lies in the mesh", arguments.input));
+        const Vec3d margin = kMargin * (covered.max - covered.min);
+        slice.boundsWorld = {covered.min - margin, covered.max + margin};
+    }
+    const int a = slice.axis;
+    slice.positionWorld = arguments.at.value_or((slice.boundsWorld.min[a] + slice.boundsWorld.max[a]) / 2);
+    if (!std::isfinite(slice.positionWorld)) throw InputError("--at: expected a finite number");
+    return slice;
+}
+
+}  // namespace
+
+void addPictureOptions(CLI::App& command, PictureArguments& a) {
+    command.add_option("vdb", a.input, "a .vdb file that tessera wrote (layout levels)")->required();
+    command.add_option("-o,--output", a.output, "the .png file")->required();
+    command.add_option("--field", a.field, "the field (default: the first)");
+    command.add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")->check(CLI::Range(0, 8));
+    command.add_option("--axis", a.axis, "the slice is normal to this axis")->check(CLI::IsMember({"x", "y", "z"}))->capture_default_str();
+    command.add_option("--at", a.at, "where along that axis, world units (default: the middle)");
+    command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
+    command.add_option("--range", a.range, "values a,b at the ends of the colour map (default: those of the slice)");
+    command.add_option("--mesh", a.mesh, "the mesh file: voxel cells that its surface cuts are drawn whole");
+    command.add_option("--pixels", a.pixels, "along the longer edge")->check(CLI::Range(16, 8192))->capture_default_str();
+    command.add_flag("--bricks", a.bricks, "draw the edges of the bricks");
+    addCommonOptions(command, a.common);
+    command.footer("Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
+                   "  tessera picture flow.vdb -o near.png --field velocity --bounds -1,-1,-1,1,1,1 --bricks --mesh flow.vtu");
+}
+
+int runPicture(const PictureArguments& arguments) {
+    Session session(arguments.common);
+    checkWritable(arguments.output);
+    const VdbFile file = readVdb(arguments.input);
+    if (file.layout != VdbLayout::levels)
+        throw InputError(fmt::format("{}: only files of layout levels can be drawn", arguments.input));
+    const OutputField& field = chooseField(file, arguments.field);
+    const SliceOptions slice = sliceOptions(arguments, file);
+    const Outside outside = readOutside(arguments, file, session.execution);
+    const NearestPointIndex nearest(outside.mesh, session.execution.threadCount());
+    const Reconstruction reconstruction(outside.mesh, outside.fields, file.tree, file.store, nearest);
+    const ScalarImage image = sampleField(file, field, arguments, reconstruction, slice, session.execution);
+
+    ValueRange range;
+    for (std::size_t i = 0; i < image.values.size(); ++i)
+        if (image.coverage[i] && std::isfinite(image.values[i])) {
+            range.min = std::min(range.min, double(image.values[i]));
+            range.max = std::max(range.max, double(image.values[i]));
+        }
+    PictureOptions options;
+    options.title = fmt::format("{}  {} = {:.4g}", field.name, arguments.axis, slice.positionWorld);
+    if (!arguments.range.empty()) {
+        const std::vector<double> ends = parseNumbers("--range", arguments.range, 2);
+        if (!(ends[0] < ends[1])) throw InputError(fmt::format("--range: expected a < b, got '{}'", arguments.range));
+        options.min = ends[0];
+        options.max = ends[1];
+    }
+    writeSlicePng(arguments.output, image, options);
+    session.print(fmt::format("{}: {} on the plane {} = {:.6g}, {} x {} pixels, values {:.6g} to {:.6g}\n", arguments.output, field.name,
+                              arguments.axis, slice.positionWorld, image.width, image.height, range.min, range.max));
+    if (!arguments.common.jsonPath.empty())
+        writeJson(arguments.common.jsonPath, Json{{"schema", 1},
+                                                  {"program", "tessera"},
+                                                  {"version", TESSERA_VERSION},
+                                                  {"command", "picture"},
+                                                  {"input", arguments.input},
+                                                  {"output", arguments.output},
+                                                  {"field", field.name},
+                                                  {"axis", arguments.axis},
+                                                  {"at", slice.positionWorld},
+                                                  {"size", {image.width, image.height}},
+                                                  {"value_range", {range.min, range.max}}});
+    return 0;
+}
+
+}  // namespace tessera

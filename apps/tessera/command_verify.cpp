@@ -80,7 +80,7 @@ std::vector<Comparison> compareReports(const TetMesh& mesh, std::span<const int>
 std::string comparisonText(const std::vector<Comparison>& rows) {
     std::vector<std::vector<std::string>> table{{"field", "figure", "in the file", "measured", "difference", ""}};
     for (const Comparison& r : rows)
-        table.push_back({r.field, r.figure, fmt::format("{:.9g}", r.claimed), fmt::format("{:.9g}", r.measured),
+        table.push_back({r.field.empty() ? "(all)" : r.field, r.figure, fmt::format("{:.9g}", r.claimed), fmt::format("{:.9g}", r.measured),
                          fmt::format("{:.2g}", r.measured - r.claimed), r.holds() ? "holds" : "DOES NOT HOLD"});
     return formatTable(table);
 }

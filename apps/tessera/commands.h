@@ -39,10 +39,11 @@ struct TetsArguments {
 };
 struct PictureArguments {
     CommonOptions common;
-    std::string input, output, field, axis = "z";
+    std::string input, output, field, mesh, bounds, range, axis = "z";
     std::optional<double> at;
     std::optional<int> component;
-    int width = 900;
+    int pixels = 800;
+    bool bricks = false;
 };
 
 void addInfoOptions(CLI::App& command, InfoArguments& arguments);

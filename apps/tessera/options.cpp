@@ -227,12 +227,17 @@ std::vector<FieldChoice> parseFields(const std::string& text) {
     return choices;
 }
 
-Box3d parseBounds(const std::string& text) {
+std::vector<double> parseNumbers(const std::string& option, const std::string& text, std::size_t count) {
     const std::vector<std::string> parts = split(text, ',');
-    if (parts.size() != 6)
-        throw InputError(fmt::format("--bounds: expected six numbers x0,y0,z0,x1,y1,z1, got '{}'", text));
-    double v[6];
-    for (std::size_t i = 0; i < 6; ++i) v[i] = parseNumber("--bounds", parts[i]);
+    if (parts.size() != count)
+        throw InputError(fmt::format("{}: expected {} numbers with commas between them, got '{}'", option, count, text));
+    std::vector<double> values;
+    for (const std::string& part : parts) values.push_back(parseNumber(option, part));
+    return values;
+}
+
+Box3d parseBounds(const std::string& text) {
+    const std::vector<double> v = parseNumbers("--bounds", text, 6);
     const Box3d box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
     for (int axis = 0; axis < 3; ++axis)
         require(box.min[axis] < box.max[axis],

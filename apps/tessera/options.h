@@ -62,6 +62,8 @@ ResampleSettings checkedSettings(const ResampleArguments& arguments);
 std::int64_t parseCount(const std::string& option, const std::string& text, bool binary);
 /// "a,b=newname". Throws InputError for empty or repeated names.
 std::vector<FieldChoice> parseFields(const std::string& text);
+/// `count` finite numbers with commas between them. Throws InputError naming `option`.
+std::vector<double> parseNumbers(const std::string& option, const std::string& text, std::size_t count);
 /// "x0,y0,z0,x1,y1,z1". Throws InputError.
 Box3d parseBounds(const std::string& text);
 

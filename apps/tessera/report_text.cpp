@@ -46,9 +46,13 @@ std::string formatTable(const std::vector<std::vector<std::string>>& rows) {
 }
 
 std::string formatCount(std::int64_t count) {
-    std::string digits = std::to_string(count);
-    for (std::ptrdiff_t i = std::ptrdiff_t(digits.size()) - 3; i > (count < 0 ? 1 : 0); i -= 3) digits.insert(std::size_t(i), ",");
-    return digits;
+    const std::string digits = std::to_string(count < 0 ? -count : count);
+    std::string text(count < 0 ? 1 : 0, '-');
+    for (std::size_t i = 0; i < digits.size(); ++i) {
+        if (i > 0 && (digits.size() - i) % 3 == 0) text += ',';
+        text += digits[i];
+    }
+    return text;
 }
 
 std::string formatBytes(std::int64_t bytes) {
@@ -75,8 +79,8 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
     appendCount(oddities, s.duplicate, "duplicate elements");
     appendCount(oddities, s.coincidentNodes, "coincident nodes");
     appendCount(oddities, s.nonConformingFaces, "non-conforming faces");
-    if (!oddities.empty()) text += "  " + oddities + "\n";
-    for (const std::string& warning : s.warnings) text += "  warning: " + warning + "\n";
+    if (!oddities.empty()) text += fmt::format("  {}\n", oddities);
+    for (const std::string& warning : s.warnings) text += fmt::format("  warning: {}\n", warning);
     return text;
 }
 

@@ -125,7 +125,8 @@ Json coverageJson(const ErrorReport& report) {
 
 Json errorJson(const ErrorReport& report) {
     Json json = Json::object();
-    for (Json& field : Json::parse(reportToJson(report))["fields"]) {
+    Json whole = Json::parse(reportToJson(report));
+    for (Json& field : whole["fields"]) {
         const std::string name = field["name"];
         field.erase("name");
         json[name] = std::move(field);

@@ -41,16 +41,11 @@ BrickRange bricksMeeting(const Box3d& index, int brickCells) {
     return {Vec3i(glm::floor(low)), Vec3i(glm::floor(high))};
 }
 
-Box3d boundsInIndexSpace(const TetMesh& mesh, const PlanFrame& frame, int depth) {
-    const Box3d world = mesh.boundsWorld();
+BrickRange clippedRange(const PlanFrame& frame, int depth) {
     const double inverse = 1.0 / frame.spacingWorld(depth);
-    return {(world.min - frame.originWorld) * inverse, (world.max - frame.originWorld) * inverse};
-}
-
-BrickRange clippedRange(const TetMesh& mesh, const PlanFrame& frame, int depth) {
-    Box3d box = boundsInIndexSpace(mesh, frame, depth);
+    Box3d box{(frame.meshBoundsWorld.min - frame.originWorld) * inverse,
+              (frame.meshBoundsWorld.max - frame.originWorld) * inverse};
     if (frame.boundsWorld) {
-        const double inverse = 1.0 / frame.spacingWorld(depth);
         box.min = glm::max(box.min, (frame.boundsWorld->min - frame.originWorld) * inverse - (2.0 + frame.brickCells));
         box.max = glm::min(box.max, (frame.boundsWorld->max - frame.originWorld) * inverse + (2.0 + frame.brickCells));
     }
@@ -87,7 +82,7 @@ BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Executio
 
 void BrickPlan::allocateRoots(const Execution& execution) {
     const double spacing = frame_.spacingWorld(0);
-    const BrickRange all = clippedRange(*mesh_, frame_, 0);
+    const BrickRange all = clippedRange(frame_, 0);
     const std::int64_t count = mesh_->elementCount();
     std::vector<std::vector<std::pair<BrickKey, std::int32_t>>> found(
         std::size_t((count + kElementChunk - 1) / kElementChunk));
@@ -266,44 +261,101 @@ BrickTree BrickPlan::tree(int finestDepth) const {
     return BrickTree(frame_.originWorld, frame_.spacingWorld(finest), frame_.brickCells, std::move(keys));
 }
 
+namespace {
+
+// The brick that a node lies in, and on which axes the slack puts it into the next one too.
+struct NodeBrick {
+    Vec3i brick;
+    std::uint32_t nextAxes;
+};
+
+std::vector<NodeBrick> nodeBricks(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution) {
+    std::vector<NodeBrick> result(mesh.points.size());
+    const double inverse = 1.0 / frame.spacingWorld(frame.maxDepth);
+    parallelForChunks(execution, mesh.nodeCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t n = begin; n < end; ++n) {
+            const Vec3d index = (mesh.points[std::size_t(n)] - frame.originWorld) * inverse;
+            const BrickRange range = bricksMeeting({index, index}, frame.brickCells);
+            const Vec3i next = range.max - range.min;
+            result[std::size_t(n)] = {range.min, std::uint32_t(next.x | next.y << 1 | next.z << 2)};
+        }
+    });
+    return result;
+}
+
+BrickRange elementRange(const TetMesh& mesh, const std::vector<NodeBrick>& nodes, std::int64_t element) {
+    const auto& tet = mesh.tets[std::size_t(element)];
+    const NodeBrick& first = nodes[std::size_t(tet[0])];
+    BrickRange range{first.brick, first.brick};
+    for (const std::int32_t n : tet) {
+        const NodeBrick& node = nodes[std::size_t(n)];
+        range.min = glm::min(range.min, node.brick);
+        Vec3i high = node.brick;
+        if (node.nextAxes) high += Vec3i(node.nextAxes & 1, (node.nextAxes >> 1) & 1, node.nextAxes >> 2);
+        range.max = glm::max(range.max, high);
+    }
+    return range;
+}
+
+// Marks of a box of bricks, one byte each, set from any thread.
+class BrickMarks {
+  public:
+    explicit BrickMarks(const BrickRange& range)
+        : range_(range), size_(range.max - range.min + 1),
+          marks_(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z), 0) {}
+    std::atomic_ref<std::uint8_t> at(int x, int y, int z) {
+        return std::atomic_ref<std::uint8_t>(marks_[(std::size_t(z - range_.min.z) * std::size_t(size_.y) +
+                                                     std::size_t(y - range_.min.y)) * std::size_t(size_.x) +
+                                                    std::size_t(x - range_.min.x)]);
+    }
+    std::int64_t count() const {
+        std::int64_t sum = 0;
+        for (const std::uint8_t mark : marks_) sum += mark;
+        return sum;
+    }
+
+  private:
+    BrickRange range_;
+    Vec3i size_;
+    std::vector<std::uint8_t> marks_;
+};
+
+}  // namespace
+
 std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit,
                            std::vector<BrickKey>* keys, const Execution& execution) {
     const int depth = frame.maxDepth;
-    const BrickRange range = clippedRange(mesh, frame, depth);
+    const BrickRange range = clippedRange(frame, depth);
     if (rangeCount(range) > kDenseLimit) return -1;
-    const Vec3i n = range.max - range.min + 1;
-    std::vector<std::uint8_t> marks(std::size_t(n.x) * std::size_t(n.y) * std::size_t(n.z), 0);
+    BrickMarks marks(range);
     const double spacing = frame.spacingWorld(depth);
-    const auto markAt = [&](int x, int y, int z) {
-        return std::atomic_ref<std::uint8_t>(
-            marks[(std::size_t(z - range.min.z) * std::size_t(n.y) + std::size_t(y - range.min.y)) * std::size_t(n.x) +
-                  std::size_t(x - range.min.x)]);
-    };
+    const std::vector<NodeBrick> nodes = nodeBricks(mesh, frame, execution);
     parallelForChunks(execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+        std::optional<ElementOverlap> element;
         for (std::int64_t e = begin; e < end; ++e) {
-            const ElementOverlap element(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
-            const BrickRange own = bricksMeeting(element.bounds(), frame.brickCells);
+            const BrickRange own = elementRange(mesh, nodes, e);
             const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
+            element.reset();
             for (int z = low.z; z <= high.z; ++z)
                 for (int y = low.y; y <= high.y; ++y)
                     for (int x = low.x; x <= high.x; ++x) {
                         // Most bricks are marked already by an earlier element: the exact test runs rarely.
-                        auto mark = markAt(x, y, z);
+                        auto mark = marks.at(x, y, z);
                         if (mark.load(std::memory_order_relaxed)) continue;
+                        if (!element) element.emplace(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
                         const BrickKey key{depth, {x, y, z}};
-                        if (element.touches(brickTouchBox(key, frame.brickCells)) && insideBounds(key, frame))
+                        if (element->touches(brickTouchBox(key, frame.brickCells)) && insideBounds(key, frame))
                             mark.store(1, std::memory_order_relaxed);
                     }
         }
     });
-    std::int64_t count = 0;
-    for (const std::uint8_t mark : marks) count += mark;
+    const std::int64_t count = marks.count();
     if (!keys || count > limit) return count;
     keys->reserve(std::size_t(count));
     for (int z = range.min.z; z <= range.max.z; ++z)
         for (int y = range.min.y; y <= range.max.y; ++y)
             for (int x = range.min.x; x <= range.max.x; ++x)
-                if (markAt(x, y, z).load(std::memory_order_relaxed)) keys->push_back({0, {x, y, z}});
+                if (marks.at(x, y, z).load(std::memory_order_relaxed)) keys->push_back({0, {x, y, z}});
     return count;
 }
 

@@ -21,6 +21,7 @@ struct PlanFrame {
     int maxDepth = 0;            ///< the finest spacing allowed is that of this depth
     int brickCells = 16;
     std::optional<Box3d> boundsWorld;
+    Box3d meshBoundsWorld;
     double spacingWorld(int depth) const;
 };
 

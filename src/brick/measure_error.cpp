@@ -250,11 +250,9 @@ void countSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, std:
     report.fullyCoveredShare = sorted.ids.empty() ? 0 : double(fullyCovered) / double(sorted.ids.size());
 }
 
-}  // namespace
-
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                         const BrickStore& store, const NearestPointIndex& nearest, const Execution& execution,
-                         const MeasureOptions& options) {
+ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                        const BrickStore& store, const Reconstruction& reconstruction, const Execution& execution,
+                        const MeasureOptions& options) {
     std::optional<ErrorSamples> own;
     if (!options.samples) own.emplace(mesh, fields, execution);
     const ErrorSamples& samples = options.samples ? *options.samples : *own;
@@ -262,7 +260,6 @@ ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const
                   "the samples are for these fields");
     if (options.leafErrors) options.leafErrors->assign(tree.leafCount(), 0.0);
     execution.report("verify", 0, 3);
-    const Reconstruction reconstruction(mesh, fields, tree, store, nearest);
     const SamplesByLeaf sorted = sortSamples(samples, tree, options.boundsWorld, execution);
     execution.report("verify", 1, 3);
     ErrorLists lists(fields.size(), std::vector<float>(samples.count(), -1.0f));
@@ -284,6 +281,20 @@ ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const
     }
     execution.report("verify", 3, 3);
     return report;
+}
+
+}  // namespace
+
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                         const BrickStore& store, const NearestPointIndex& nearest, const Execution& execution,
+                         const MeasureOptions& options) {
+    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest), execution, options);
+}
+
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                         const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
+                         const MeasureOptions& options) {
+    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest), execution, options);
 }
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
 #include "brick/error_report.h"
+#include "brick/seams.h"
 #include "mesh/nearest_point.h"
 #include "mesh/tet_mesh.h"
 
@@ -31,5 +32,7 @@ struct MeasureOptions {
 /// @param fields indices into mesh.fields whose components are the store's channels, in this order.
 ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
                          const NearestPointIndex& nearest, const Execution& execution, const MeasureOptions& options = {});
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
+                         const NearestOnDemand& nearest, const Execution& execution, const MeasureOptions& options = {});
 
 }  // namespace tessera

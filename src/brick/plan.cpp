@@ -74,7 +74,7 @@ std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxL
 }
 
 // Largest resolution whose plan fits, by bisection; 0 when none does.
-int largestResolution(const TetMesh& mesh, RefineOptions options, std::size_t maxLeaves, int tooLarge,
+int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions options, std::size_t maxLeaves, int tooLarge,
                       const Execution& execution) {
     options.frame.reset();
     options.spacingWorld = 0;
@@ -83,7 +83,7 @@ int largestResolution(const TetMesh& mesh, RefineOptions options, std::size_t ma
         // Counts grow with the cube; aim at a tenth of the interval first when it is wide.
         options.resolution = fails > 8 * fits ? std::max(fits + 1, int(std::sqrt(double(fits) * fails)))
                                               : (fits + fails) / 2;
-        const std::int64_t count = countUniform(mesh, chooseFrame(mesh, options), maxLeaves, nullptr, execution);
+        const std::int64_t count = countUniform(mesh, chooseFrame(meshBox, options), maxLeaves, nullptr, execution);
         (count <= std::int64_t(maxLeaves) ? fits : fails) = options.resolution;
     }
     return fits > 1 ? fits : 0;
@@ -95,16 +95,16 @@ std::string budgetText(const RefineOptions& options, std::size_t maxLeaves) {
            (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound" : "a quarter of the memory here") + ")";
 }
 
-BrickTree planUniform(const TetMesh& mesh, const RefineOptions& options, std::size_t maxLeaves,
+BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options, std::size_t maxLeaves,
                       const Execution& execution) {
-    const PlanFrame frame = chooseFrame(mesh, options);
+    const PlanFrame frame = chooseFrame(meshBox, options);
     std::vector<BrickKey> keys;
     const std::int64_t count = countUniform(mesh, frame, maxLeaves, &keys, execution);
     if (count > std::int64_t(maxLeaves)) {
-        const Vec3d size = (options.boundsWorld ? *options.boundsWorld : mesh.boundsWorld()).size();
+        const Vec3d size = (options.boundsWorld ? *options.boundsWorld : meshBox).size();
         const double longest = std::max({size.x, size.y, size.z});
         const int points = int(std::min(5e8, std::ceil(longest / frame.spacingWorld(0)) + 1));
-        const int fits = largestResolution(mesh, options, maxLeaves, points, execution);
+        const int fits = largestResolution(mesh, meshBox, options, maxLeaves, points, execution);
         throw InputError("the uniform lattice of " + std::to_string(points) +
                          " points along the longest axis needs more than " + budgetText(options, maxLeaves) +
                          (fits ? "; a resolution of " + std::to_string(fits) + " (spacing " +
@@ -114,9 +114,9 @@ BrickTree planUniform(const TetMesh& mesh, const RefineOptions& options, std::si
     return BrickTree(frame.originWorld, frame.spacingWorld(frame.maxDepth), frame.brickCells, std::move(keys));
 }
 
-BrickTree planByElementSize(const TetMesh& mesh, const RefineOptions& options, std::size_t maxLeaves,
-                            const Execution& execution, std::vector<std::string>* notes) {
-    const PlanFrame frame = chooseFrame(mesh, options);
+BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
+                            std::size_t maxLeaves, const Execution& execution, std::vector<std::string>* notes) {
+    const PlanFrame frame = chooseFrame(meshBox, options);
     const bool isDefault = options.maxVoxels == 0 && options.maxMemoryBytes == 0 && !hasFinestSpacing(options);
     const std::size_t brickPoints = std::size_t(std::pow(options.brickCells, 3));
     if (isDefault) maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
@@ -157,13 +157,14 @@ BrickTree planByElementSize(const TetMesh& mesh, const RefineOptions& options, s
 
 BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution, int channels,
                      std::vector<std::string>* notes) {
-    checkOptions(mesh, options);
+    const Box3d meshBox = meshBounds(mesh, execution);
+    checkOptions(mesh, meshBox, options);
     TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");
     execution.report("plan", 0, 1);
     const std::size_t maxLeaves = leafBudget(options, channels);
     BrickTree tree = options.criterion == Criterion::uniform
-                         ? planUniform(mesh, options, maxLeaves, execution)
-                         : planByElementSize(mesh, options, maxLeaves, execution, notes);
+                         ? planUniform(mesh, meshBox, options, maxLeaves, execution)
+                         : planByElementSize(mesh, meshBox, options, maxLeaves, execution, notes);
     execution.report("plan", 1, 1);
     return tree;
 }

@@ -47,7 +47,21 @@ double finestSpacing(const RefineOptions& options, double longest) {
 
 }  // namespace
 
-void checkOptions(const TetMesh& mesh, const RefineOptions& options) {
+Box3d meshBounds(const TetMesh& mesh, const Execution& execution) {
+    constexpr std::int64_t kChunk = 16384;
+    std::vector<Box3d> parts(std::size_t((mesh.elementCount() + kChunk - 1) / kChunk));
+    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        Box3d box;
+        for (std::int64_t e = begin; e < end; ++e)
+            for (const std::int32_t node : mesh.tets[std::size_t(e)]) box.include(mesh.points[std::size_t(node)]);
+        parts[std::size_t(begin / kChunk)] = box;
+    });
+    Box3d all;
+    for (const Box3d& part : parts) all.include(part);
+    return all;
+}
+
+void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options) {
     const auto require = [](bool condition, const std::string& message) {
         if (!condition) throw InputError(message);
     };
@@ -71,7 +85,6 @@ void checkOptions(const TetMesh& mesh, const RefineOptions& options) {
         require(finite(options.frame->originWorld) && std::isfinite(options.frame->spacingWorld) &&
                     options.frame->spacingWorld > 0,
                 "the given lattice's spacing must be positive and finite");
-    const Box3d meshBox = mesh.boundsWorld();
     require(longestSide(meshBox) > 0, "the mesh has no extent: all nodes coincide");
     if (options.boundsWorld) {
         const Box3d& box = *options.boundsWorld;
@@ -82,8 +95,7 @@ void checkOptions(const TetMesh& mesh, const RefineOptions& options) {
     }
 }
 
-PlanFrame chooseFrame(const TetMesh& mesh, const RefineOptions& options) {
-    const Box3d meshBox = mesh.boundsWorld();
+PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     const Box3d box = options.boundsWorld ? *options.boundsWorld : meshBox;
     const Box3d sampled{glm::max(box.min, meshBox.min), glm::min(box.max, meshBox.max)};
     const double longest = longestSide(box);
@@ -92,6 +104,7 @@ PlanFrame chooseFrame(const TetMesh& mesh, const RefineOptions& options) {
     PlanFrame frame;
     frame.brickCells = options.brickCells;
     frame.boundsWorld = options.boundsWorld;
+    frame.meshBoundsWorld = meshBox;
     frame.originWorld = options.frame ? options.frame->originWorld : box.min;
     const int levels = options.maxLevels > 0                              ? options.maxLevels
                        : options.criterion == Criterion::elementSize ? kDefaultLevels

@@ -5,8 +5,11 @@
 
 namespace tessera {
 
-/// Throws InputError for options out of range or that contradict each other.
-void checkOptions(const TetMesh& mesh, const RefineOptions& options);
+/// Throws InputError for options out of range or that contradict each other, and for a mesh without elements or extent.
+void checkOptions(const TetMesh& mesh, const Box3d& meshBoundsWorld, const RefineOptions& options);
+
+/// mesh.boundsWorld(), on all threads.
+Box3d meshBounds(const TetMesh& mesh, const Execution& execution);
 
 /// True when the user fixed the finest spacing.
 inline bool hasFinestSpacing(const RefineOptions& options) {
@@ -15,7 +18,7 @@ inline bool hasFinestSpacing(const RefineOptions& options) {
 
 /// The lattices for these options. With a finest spacing given, depth frame.maxDepth has it; else depth 0 has 64 points (32 for
 /// bricks of 8) along the longest axis, from the bounds' minimum to their maximum, and so has every finer one.
-PlanFrame chooseFrame(const TetMesh& mesh, const RefineOptions& options);
+PlanFrame chooseFrame(const Box3d& meshBoundsWorld, const RefineOptions& options);
 
 /// Leaves that the bounds on voxels and memory allow.
 std::size_t leafBudget(const RefineOptions& options, int channels);

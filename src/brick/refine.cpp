@@ -65,6 +65,12 @@ std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fi
     return bounds;
 }
 
+// Built here, where all threads are free for it, when some place will very likely ask for it.
+void buildIfNeeded(const NearestOnDemand& nearest, const BrickStore& store) {
+    const std::int64_t points = std::int64_t(store.leafCount()) * store.tileCount() * kTilePoints;
+    if (store.coveredPoints() < points) nearest.get();
+}
+
 class ErrorRefinement {
   public:
     ErrorRefinement(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
@@ -77,7 +83,7 @@ class ErrorRefinement {
           samples_(mesh, fields, execution),
           nearest_(mesh, execution.threads),
           bounds_(errorBounds(mesh, fields, samples_, options)),
-          plan_(mesh, chooseFrame(mesh, options), execution) {
+          plan_(mesh, chooseFrame(meshBounds(mesh, execution), options), execution) {
         plan_.placeOfSample = [this](std::uint32_t sample) {
             return samples_.placeWorld(sample, plan_.frame().originWorld);
         };
@@ -116,7 +122,7 @@ class ErrorRefinement {
     const Execution& execution_;
     std::unique_ptr<BoundResampler> bound_;
     ErrorSamples samples_;
-    NearestPointIndex nearest_;
+    NearestOnDemand nearest_;
     std::vector<FieldBound> bounds_;
     BrickPlan plan_;
     std::size_t budgetLeaves_ = 0;
@@ -213,6 +219,7 @@ double ErrorRefinement::leafRatio(std::size_t leaf, const PlannedBrick& brick, L
 
 void ErrorRefinement::measureChanged() {
     Timer timer;
+    if (rounds_ == 0) buildIfNeeded(nearest_, store_);
     const Reconstruction reconstruction(mesh_, fields_, tree_, store_, nearest_);
     constexpr std::int64_t kChunk = 16;
     parallelForChunks(execution_, std::int64_t(leaves_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
@@ -347,9 +354,9 @@ BrickResult ErrorRefinement::run() {
 
 BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
                               const RefineOptions& options, const Execution& execution) {
-    checkOptions(mesh, options);
     Timer timer;
     if (options.criterion == Criterion::error) {
+        checkOptions(mesh, meshBounds(mesh, execution), options);
         ErrorRefinement refinement(mesh, fields, resampler, options, execution);
         const double setupMs = timer.elapsedMs();
         BrickResult result = refinement.run();
@@ -364,7 +371,8 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
     const auto bound = resampler.bind(mesh, fields);
     result.store = resampleTree(result.tree, *bound, channels, execution, result.statistics);
     result.times.resampleMs = timer.restart();
-    const NearestPointIndex nearest(mesh, execution.threads);
+    const NearestOnDemand nearest(mesh, execution.threads);
+    buildIfNeeded(nearest, result.store);
     MeasureOptions measure;
     measure.boundsWorld = options.boundsWorld;
     result.report = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);

@@ -36,9 +36,19 @@ CellPlace locateInBrick(const Vec3d& local, int brickCells) {
 Reconstruction::Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                                const BrickStore& store, const NearestPointIndex& nearest)
     : mesh_(&mesh), tree_(&tree), store_(&store), nearest_(&nearest) {
+    nameChannels(fields);
+}
+
+Reconstruction::Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                               const BrickStore& store, const NearestOnDemand& nearest)
+    : mesh_(&mesh), tree_(&tree), store_(&store), nearestOnDemand_(&nearest) {
+    nameChannels(fields);
+}
+
+void Reconstruction::nameChannels(std::span<const int> fields) {
     for (const int f : fields)
-        for (int c = 0; c < mesh.fields[std::size_t(f)].components; ++c) channelOf_.emplace_back(f, c);
-    TESSERA_CHECK(std::int64_t(channelOf_.size()) == store.channels(), "the fields are the store's channels");
+        for (int c = 0; c < mesh_->fields[std::size_t(f)].components; ++c) channelOf_.emplace_back(f, c);
+    TESSERA_CHECK(std::int64_t(channelOf_.size()) == store_->channels(), "the fields are the store's channels");
 }
 
 SeamValue Reconstruction::at(int level, const Vec3i& p, int channel) const {
@@ -105,8 +115,9 @@ bool Reconstruction::outside(int level, const Vec3i& p, int firstChannel, std::s
     if (values.empty()) return false;   // the caller asks for coverage only
     const Vec3d place = tree_->lattice(level).worldFromIndex(Vec3d(p));
     // Most callers ask within a voxel of the mesh; a short search first is cheaper.
-    NearestPoint found = nearest_->find(place, 4 * tree_->spacingWorld(level));
-    if (found.element < 0) found = nearest_->find(place, std::numeric_limits<double>::infinity());
+    const NearestPointIndex& nearest = nearest_ ? *nearest_ : nearestOnDemand_->get();
+    NearestPoint found = nearest.find(place, 4 * tree_->spacingWorld(level));
+    if (found.element < 0) found = nearest.find(place, std::numeric_limits<double>::infinity());
     for (std::size_t c = 0; c < values.size(); ++c) {
         const auto [field, component] = channelOf_[std::size_t(firstChannel) + c];
         values[c] = found.element < 0 ? std::numeric_limits<double>::quiet_NaN()

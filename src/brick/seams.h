@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <span>
 #include <utility>
 #include <vector>
@@ -32,6 +34,22 @@ inline double cornerWeight(const Vec3d& fraction, int c) {
            (c & 4 ? fraction.z : 1 - fraction.z);
 }
 
+/// A nearest-point index that is built when first asked for: meshes that fill their bricks never need one. Thread-safe.
+class NearestOnDemand {
+  public:
+    NearestOnDemand(const TetMesh& mesh, int threads) : mesh_(&mesh), threads_(threads) {}
+    const NearestPointIndex& get() const {
+        std::call_once(once_, [this] { index_ = std::make_unique<NearestPointIndex>(*mesh_, threads_); });
+        return *index_;
+    }
+
+  private:
+    const TetMesh* mesh_;
+    int threads_;
+    mutable std::once_flag once_;
+    mutable std::unique_ptr<NearestPointIndex> index_;
+};
+
 /// Reads the continuous reconstruction: stored samples, except that a lattice point on the border to a coarser brick takes the value
 /// that trilinear interpolation in the coarse brick gives there, and a point outside the mesh takes the value at the nearest mesh
 /// point. Thread-safe.
@@ -39,6 +57,8 @@ class Reconstruction {
   public:
     Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
                    const NearestPointIndex& nearest);
+    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
+                   const NearestOnDemand& nearest);
     /// At point `p` of the lattice of `level`, which must lie in the closed box of a leaf of that level.
     SeamValue at(int level, const Vec3i& p, int channel) const;
     /// The same for several channels at once: values.size() of them from `firstChannel` on; none asks for coverage only.
@@ -52,12 +72,14 @@ class Reconstruction {
     bool stored(std::size_t leaf, const Vec3i& local, int level, const Vec3i& p, int firstChannel,
                 std::span<double> values) const;
     bool fromCoarse(int level, const Vec3i& p, int coarse, int firstChannel, std::span<double> values) const;
+    void nameChannels(std::span<const int> fields);
     bool outside(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
 
     const TetMesh* mesh_;
     const BrickTree* tree_;
     const BrickStore* store_;
-    const NearestPointIndex* nearest_;
+    const NearestPointIndex* nearest_ = nullptr;
+    const NearestOnDemand* nearestOnDemand_ = nullptr;
     std::vector<std::pair<int, int>> channelOf_;   // (field, component) of each channel
 };
 

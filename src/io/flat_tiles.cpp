@@ -238,16 +238,17 @@ class FlatSampler {
             for (int c = 0; c < store_.channels(); ++c) corners.values[std::size_t(c) * count + i] = double(extended[c]);
             return;
         }
-        const bool owned = local.x < cells && local.y < cells && local.z < cells;
+        // An owned point keeps its exact coverage, also where its value comes from a still coarser brick.
         bool covered = false;
-        // An owned point's coverage is known without a search for the nearest mesh point, which `at` makes for points outside.
-        if (owned) store_.value(leaf, local, 0, covered);
-        if (owned && !covered) return;
-        for (int c = 0; c < store_.channels(); ++c) {
-            const SeamValue value = reconstruction_->at(level, p, c);
-            if (!owned && !value.covered) return;
-            corners.values[std::size_t(c) * count + i] = value.value;
+        if (local.x < cells && local.y < cells && local.z < cells) {
+            store_.value(leaf, local, 0, covered);
+        } else {
+            covered = reconstruction_->resolve(level, p, 0, {});
         }
+        if (!covered) return;
+        std::vector<double> values(std::size_t(store_.channels()));
+        reconstruction_->resolve(level, p, 0, values);
+        for (std::size_t c = 0; c < values.size(); ++c) corners.values[c * count + i] = values[c];
         corners.state[i] = 1;
     }
 

@@ -5,8 +5,12 @@
 #include <unistd.h>
 
 #include <array>
+#include <bit>
+#include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <new>
@@ -47,28 +51,54 @@ bool checkBytes(const std::string& path) {
     return true;
 }
 
-// OpenVDB trusts what it reads, so a damaged file can end the process. A file that no digest vouches for is read in a child first, which may die.
+// Address space in use now, in bytes.
+std::uint64_t addressSpaceBytes() {
+    std::ifstream status("/proc/self/statm");
+    std::uint64_t pages = 0;
+    status >> pages;
+    return pages * std::uint64_t(::sysconf(_SC_PAGESIZE));
+}
+
+// What a read may take at most, for a file of this size: more means that a damaged length is believed.
+void limitReader(std::uint64_t fileBytes) {
+    const rlimit noCore{0, 0};
+    ::setrlimit(RLIMIT_CORE, &noCore);
+    const rlim_t seconds = 10 + rlim_t(fileBytes >> 20);
+    const rlimit cpu{seconds, seconds};
+    ::setrlimit(RLIMIT_CPU, &cpu);
+#ifndef __SANITIZE_ADDRESS__   // it reserves terabytes itself
+    const rlim_t bytes = rlim_t(addressSpaceBytes() + (std::uint64_t(256) << 20) + 64 * fileBytes);
+    const rlimit memory{bytes, bytes};
+    ::setrlimit(RLIMIT_AS, &memory);
+#endif
+    for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) ::signal(signal, SIG_DFL);
+}
+
+// OpenVDB trusts what it reads, so a damaged file can end the process or fill the memory. A file that no digest vouches for is read in a
+// child first, which may die.
 template <class Read>
 void tryInChild(const std::string& path, const Read& read) {
+    const std::uint64_t fileBytes = std::filesystem::file_size(path);
     const pid_t child = ::fork();
     if (child < 0) throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
     if (child == 0) {
-        const rlimit noCore{0, 0};
-        ::setrlimit(RLIMIT_CORE, &noCore);
-        const rlimit seconds{300, 300};
-        ::setrlimit(RLIMIT_CPU, &seconds);
-        for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL}) ::signal(signal, SIG_DFL);
-        // An exception is reported by the parent, which gets the same one.
+        limitReader(fileBytes);
+        // These exceptions the parent gets again when it reads, and tells better.
         try {
             read();
+        } catch (const openvdb::Exception&) {
+        } catch (const InputError&) {
         } catch (...) {
+            ::_exit(1);
         }
         ::_exit(0);
     }
     int status = 0;
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-    if (!WIFEXITED(status)) refuse(path, "the file is damaged: OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it");
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+    refuse(path, "the file is damaged: " + (WIFEXITED(status) ? std::string("a length in it is impossible")
+                                                             : "OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it"));
 }
 
 template <class Read>

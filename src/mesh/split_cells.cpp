@@ -1,6 +1,7 @@
 #include "mesh/split_cells.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <span>
@@ -18,9 +19,10 @@ using Tet = std::array<std::int32_t, 4>;
 
 constexpr std::int64_t kCellChunk = 1 << 12;
 
-/// A face is fanned from its smallest node unless the worst triangle of that fan is this much smaller than that of the best fan. (On a snappyHexMesh
-/// mesh of warped octree cells, 0.8 leaves no cell folded over, 0.2 and less leaves dozens.)
-constexpr double kGoodFan = 0.8;
+/// A fan is good when no triangle of it leans away from the face's normal by more than about 37 degrees, and its worst triangle isn't
+/// much smaller than that of the best fan. (On a snappyHexMesh mesh of warped octree cells, fans that lean fold their cells over.)
+constexpr double kLeastCosine = 0.8;
+constexpr double kLeastShare = 0.05;
 
 /// A face of a fixed kind of cell: local nodes counter-clockwise seen from outside.
 struct LocalFace {
@@ -61,6 +63,7 @@ class Splitter {
             return;
         }
         triangles_.clear();
+        grazing_.clear();
         if (kind == CellKind::polyhedron) {
             fanPolyhedron(nodes);
         } else {
@@ -131,12 +134,14 @@ class Splitter {
     std::int32_t cell_ = 0;
     std::vector<std::int32_t> nodes_;      // of the cell
     std::vector<std::int32_t> polygon_;    // one face
+    std::vector<std::int32_t> grazing_;    // nodes that see a triangle of one of their own faces, mostly edge-on
     std::vector<Triangle> triangles_;      // of all faces, counter-clockwise seen from outside
 };
 
-/// The position in polygon_ that its triangles are fanned from. The share of a triangle is its area seen along the face's normal: negative when it is
-/// folded over, as at a concave corner, 0 at a hanging node. Both cells at the face come to the same choice bit for bit, because all is
-/// computed from the smallest node towards its smaller neighbour.
+/// The position in polygon_ that its triangles are fanned from: the smallest node if its fan is good, else the node whose worst triangle is
+/// largest. A triangle's share is its area seen along the face's normal: negative when it is folded over, as at a concave corner, 0 at a
+/// hanging node. Both cells at the face come to the same choice bit for bit, because all is computed from
+/// the smallest node towards its smaller neighbour.
 std::size_t Splitter::chooseFanStart() const {
     const std::size_t n = polygon_.size();
     std::size_t smallest = 0;
@@ -151,23 +156,30 @@ std::size_t Splitter::chooseFanStart() const {
     };
     Vec3d normal(0);
     for (std::size_t i = 1; i + 1 < n; ++i) normal += triangleNormal(0, i);
-    const auto worstShare = [&](std::size_t start) {
+    const double area2 = glm::dot(normal, normal);
+    const auto worstShare = [&](std::size_t start, double& worstCosine2) {
         double worst = std::numeric_limits<double>::infinity();
-        for (std::size_t i = 1; i + 1 < n; ++i) worst = std::min(worst, glm::dot(triangleNormal(start, i), normal));
+        for (std::size_t i = 1; i + 1 < n; ++i) {
+            const Vec3d triangle = triangleNormal(start, i);
+            const double share = glm::dot(triangle, normal);
+            worst = std::min(worst, share);
+            worstCosine2 = std::min(worstCosine2, share * std::fabs(share) / (glm::dot(triangle, triangle) * area2));
+        }
         return worst;
     };
-    const double smallestShare = worstShare(0);
+    double smallestCosine2 = 1, unused = 1;
+    const double smallestShare = worstShare(0, smallestCosine2);
     double bestShare = smallestShare;
     std::size_t best = 0;
     // Opposite nodes of a quad give the same fan.
     for (std::size_t k = 1; k < (n == 4 ? 2 : n); ++k) {
-        const double share = worstShare(k);
+        const double share = worstShare(k, unused);
         if (share <= bestShare) continue;
         best = k;
         bestShare = share;
     }
-    if (smallestShare > kGoodFan * bestShare) return smallest;
-    return (smallest + best * step) % n;
+    const bool good = smallestCosine2 >= kLeastCosine * kLeastCosine && smallestShare >= kLeastShare * bestShare;
+    return good ? smallest : (smallest + best * step) % n;
 }
 
 void Splitter::fanPolygon() {
@@ -179,16 +191,24 @@ void Splitter::fanPolygon() {
         if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[0] != triangle[2])
             triangles_.push_back(triangle);
     }
+    for (std::size_t i = 0; i < n; ++i) {
+        const bool inEveryTriangle = n == 3 || i == start || (n == 4 && i == (start + 2) % n);
+        if (!inEveryTriangle) grazing_.push_back(polygon_[i]);
+    }
 }
 
-/// Emits the cone over the faces' triangles from the first of these that does: a node, in coordinate order, that leaves every tet the sign of the
-/// cell; a node that gives flat tets besides; the centre; the smallest node as it is. A polyhedron prefers its centre to flat tets.
+/// Emits the cone over the faces' triangles from the first of these that serves: a node, in coordinate order, from which every tet has the sign of
+/// the cell and none grazes a face; the centre; a node from which some tets are slivers, then flat; for a
+/// polyhedron the centre whatever it does; the smallest node as it is.
 void Splitter::coneTriangles(bool isPolyhedron) {
     if (triangles_.empty()) return;
     const auto smaller = [&](std::int32_t a, std::int32_t b) { return before(a, b); };
+    const auto grazes = [&](std::int32_t node) {
+        return std::find(grazing_.begin(), grazing_.end(), node) != grazing_.end();
+    };
     const std::int32_t smallest = *std::min_element(nodes_.begin(), nodes_.end(), smaller);
     const auto smallestSigns = coneSigns(place(smallest), smallest);
-    if (smallestSigns.first * smallestSigns.second > 0) {
+    if (smallestSigns.first * smallestSigns.second > 0 && !grazes(smallest)) {
         emitCone(smallest);
         return;
     }
@@ -201,24 +221,25 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     const auto allKeepSign = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second < 0 : signs.first > 0; };
     const auto noneInverted = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second <= 0 : signs.first >= 0; };
 
-    std::int32_t withFlat = -1;
+    std::int32_t withSlivers = -1, withFlat = -1;
     for (const std::int32_t node : nodes_) {
         const auto signs = coneSigns(place(node), node);
-        if (allKeepSign(signs)) {
+        if (allKeepSign(signs) && !grazes(node)) {
             emitCone(node);
             return;
         }
+        if (withSlivers < 0 && allKeepSign(signs)) withSlivers = node;
         if (withFlat < 0 && noneInverted(signs)) withFlat = node;
     }
     const auto centreSigns = coneSigns(centre, -1);
-    const bool takeCentre = isPolyhedron ? allKeepSign(centreSigns) || withFlat < 0 : withFlat < 0 && noneInverted(centreSigns);
-    if (!takeCentre) {
-        emitCone(withFlat >= 0 ? withFlat : smallest);
+    const bool nodeServes = withSlivers >= 0 || withFlat >= 0;
+    if (allKeepSign(centreSigns) || (!nodeServes && (isPolyhedron || noneInverted(centreSigns)))) {
+        const auto added = std::int32_t(points_.size() + result.addedNodes.size());
+        result.addedNodes.push_back({centre, nodes_});
+        emitCone(added);
         return;
     }
-    const auto added = std::int32_t(points_.size() + result.addedNodes.size());
-    result.addedNodes.push_back({centre, nodes_});
-    emitCone(added);
+    emitCone(withSlivers >= 0 ? withSlivers : withFlat >= 0 ? withFlat : smallest);
 }
 
 /// Makes neighbouring faces run through their common edge in opposite directions: not every writer does. The majority of

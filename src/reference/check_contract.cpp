@@ -32,7 +32,8 @@ struct Channel {
 /// Distance from |x| to the next float.
 double floatUlp(double x) {
     const double most = std::abs(x);
-    if (most < double(std::numeric_limits<float>::min())) return double(std::numeric_limits<float>::denorm_min());
+    if (most < double(std::numeric_limits<float>::min()))
+        return double(std::numeric_limits<float>::denorm_min());
     int exponent = 0;
     std::frexp(most, &exponent);
     return std::ldexp(1.0, exponent - 24);
@@ -43,7 +44,7 @@ enum class Fault { none, overshoot, inaccurate, wrongCellValue, wrongValidity };
 /// How one value fits one element.
 struct Fit {
     Fault fault = Fault::none;
-    double ratio = 0;   ///< difference over what clause 4 allows
+    double ratio = 0;  ///< difference over what clause 4 allows
     bool passes() const { return fault == Fault::none; }
 };
 
@@ -76,19 +77,23 @@ class Owner {
         if (ratio <= uninteresting) return {Fault::none, ratio};
         const double allowed = ulps + gradient(channel) * bounds_->placeVoxels;
         ratio *= ulps / allowed;
-        if (ratio > 0.99) ratio = std::abs(mpq_class(exact(channel) - mpq_class(double(value))).get_d()) / allowed;
+        if (ratio > 0.99)
+            ratio = std::abs(mpq_class(exact(channel) - mpq_class(double(value))).get_d()) / allowed;
         return {ratio <= 1 ? Fault::none : Fault::inaccurate, ratio};
     }
 
     std::string describe(const Channel& channel) {
         const auto& tet = oracle_->mesh().tets[std::size_t(candidate_.element)];
-        std::string text = format("    element %d: depth %.6g, distance %.6g voxel%s;", candidate_.element,
-                                  candidate_.depthVoxels, candidate_.distanceVoxels, candidate_.contains ? " (in)" : "");
+        std::string text =
+            format("    element %d: depth %.6g, distance %.6g voxel%s;", candidate_.element,
+                   candidate_.depthVoxels, candidate_.distanceVoxels, candidate_.contains ? " (in)" : "");
         if (channel.field->location == FieldLocation::cell)
-            return text + format(" cell value %.9g", channel.field->at(candidate_.element, channel.component));
+            return text +
+                   format(" cell value %.9g", channel.field->at(candidate_.element, channel.component));
         const std::array<double, 4> nodes = nodeValues(channel);
         if (std::all_of(nodes.begin(), nodes.end(), [](double f) { return std::isfinite(f); }))
-            text += format(" exact value %.17g, gradient %.6g per voxel;", exact(channel).get_d(), gradient(channel));
+            text += format(" exact value %.17g, gradient %.6g per voxel;", exact(channel).get_d(),
+                           gradient(channel));
         for (std::size_t i = 0; i < 4; ++i) {
             const Vec3d& at = oracle_->mesh().points[std::size_t(tet[i])];
             text += format(" [%.17g %.17g %.17g: %.17g]", at.x, at.y, at.z, nodes[i]);
@@ -147,8 +152,8 @@ class Owner {
 /// Goes over a block point by point and fills the report.
 class Checker {
   public:
-    Checker(const Block& block, const ReferenceBlock& reference, const Oracle& oracle, std::span<const int> fields,
-            const ContractBounds& bounds)
+    Checker(const Block& block, const ReferenceBlock& reference, const Oracle& oracle,
+            std::span<const int> fields, const ContractBounds& bounds)
         : block_(block), reference_(reference), oracle_(oracle), bounds_(bounds) {
         for (const int f : fields) {
             const Field& field = oracle.mesh().fields[std::size_t(f)];
@@ -156,9 +161,9 @@ class Checker {
         }
         TESSERA_CHECK(block.box == reference.box, "block and reference are of different boxes");
         TESSERA_CHECK(block.channels == int(channels_.size()), "a block has a channel for every component");
-        TESSERA_CHECK(block.coverage.size() == block.count() &&
-                          block.values.size() == block.count() * channels_.size(),
-                      "a block's arrays fit its box");
+        TESSERA_CHECK(
+            block.coverage.size() == block.count() && block.values.size() == block.count() * channels_.size(),
+            "a block's arrays fit its box");
         TESSERA_CHECK(reference.toleranceVoxels == bounds.spillVoxels, "the reference has another tolerance");
     }
 
@@ -200,8 +205,10 @@ class Checker {
         for (const Candidate& c : candidates) deepest = std::max(deepest, c.depthVoxels);
         std::vector<Owner> owners;
         for (const Candidate& c : candidates)
-            if (c.depthVoxels >= deepest - bounds_.spillVoxels - kSlack) owners.emplace_back(oracle_, c, p, bounds_);
-        std::stable_partition(owners.begin(), owners.end(), [](const Owner& o) { return o.candidate().contains; });
+            if (c.depthVoxels >= deepest - bounds_.spillVoxels - kSlack)
+                owners.emplace_back(oracle_, c, p, bounds_);
+        std::stable_partition(owners.begin(), owners.end(),
+                              [](const Owner& o) { return o.candidate().contains; });
         return owners;
     }
 
@@ -221,7 +228,8 @@ class Checker {
             std::size_t worstChannel = 0;
             auto& ofOwner = fits.emplace_back();
             for (std::size_t c = 0; c < channels_.size(); ++c) {
-                const Fit& fit = ofOwner.emplace_back(owner.fit(channels_[c], valueAt(c, p), report_.worstRatio));
+                const Fit& fit =
+                    ofOwner.emplace_back(owner.fit(channels_[c], valueAt(c, p), report_.worstRatio));
                 passes = passes && fit.passes();
                 if (fit.ratio > worst) worst = fit.ratio, worstChannel = c;
             }
@@ -235,7 +243,8 @@ class Checker {
         }
         bool isOfNoChannel = true;
         for (std::size_t c = 0; c < channels_.size(); ++c) {
-            const bool passes = std::any_of(fits.begin(), fits.end(), [&](const auto& f) { return f[c].passes(); });
+            const bool passes =
+                std::any_of(fits.begin(), fits.end(), [&](const auto& f) { return f[c].passes(); });
             if (passes) continue;
             isOfNoChannel = false;
             classify(p, c, fits);
@@ -249,7 +258,8 @@ class Checker {
     /// No right owner explains the value: says which clause it breaks.
     void classify(const Vec3i& p, std::size_t channel, const std::vector<std::vector<Fit>>& fits) {
         const auto all = [&](Fault fault) {
-            return std::all_of(fits.begin(), fits.end(), [&](const auto& f) { return f[channel].fault == fault; });
+            return std::all_of(fits.begin(), fits.end(),
+                               [&](const auto& f) { return f[channel].fault == fault; });
         };
         if (channels_[channel].field->location == FieldLocation::cell || isOfAnother(p, channel)) {
             ++report_.wrongOwner;
@@ -278,12 +288,13 @@ class Checker {
     void offend(const char* what, const Vec3i& p, int channel) {
         if (!report_.firstOffence.empty()) return;
         const Vec3d world = block_.lattice.worldFromIndex(Vec3d(p));
-        std::string text = format("%s at lattice point (%d %d %d), world (%.17g %.17g %.17g)", what, p.x, p.y, p.z,
-                                  world.x, world.y, world.z);
+        std::string text = format("%s at lattice point (%d %d %d), world (%.17g %.17g %.17g)", what, p.x, p.y,
+                                  p.z, world.x, world.y, world.z);
         const auto c = std::size_t(std::max(channel, 0));
         if (channel >= 0) {
             const auto value = double(valueAt(c, p));
-            text += format(", channel %d (%s): value %.9g = %a", channel, channels_[c].field->name.c_str(), value, value);
+            text += format(", channel %d (%s): value %.9g = %a", channel, channels_[c].field->name.c_str(),
+                           value, value);
         }
         const auto candidates = reference_.candidatesOf(block_.offset(p));
         for (std::size_t i = 0; i < std::min<std::size_t>(candidates.size(), 8) && !channels_.empty(); ++i)
@@ -313,10 +324,12 @@ ContractReport& ContractReport::operator+=(const ContractReport& other) {
 
 std::string ContractReport::summary() const {
     std::string text = format(
-        "points %lld, in mesh %lld, covered %lld; holes %lld, spill %lld, overshoot %lld, inaccurate %lld, wrong owner "
+        "points %lld, in mesh %lld, covered %lld; holes %lld, spill %lld, overshoot %lld, inaccurate %lld, "
+        "wrong owner "
         "%lld, wrong validity %lld; worst accuracy ratio %.4f",
         (long long)points, (long long)inMesh, (long long)covered, (long long)holes, (long long)spill,
-        (long long)overshoot, (long long)inaccurate, (long long)wrongOwner, (long long)wrongValidity, worstRatio);
+        (long long)overshoot, (long long)inaccurate, (long long)wrongOwner, (long long)wrongValidity,
+        worstRatio);
     if (!worstRatioPlace.empty()) text += " at " + worstRatioPlace;
     if (!firstOffence.empty()) text += "\n  first: " + firstOffence;
     return text;

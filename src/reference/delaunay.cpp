@@ -1,6 +1,7 @@
-// Based on: A. Bowyer, Computing Dirichlet tessellations, and D. F. Watson, Computing the n-dimensional Delaunay tessellation with
-// application to Voronoi polytopes, both The Computer Journal 24(2), 1981. Predicates are filtered: double with a bound
-// after J. R. Shewchuk, Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates, 1997, else GMP.
+// Based on: A. Bowyer, Computing Dirichlet tessellations, and D. F. Watson, Computing the n-dimensional
+// Delaunay tessellation with application to Voronoi polytopes, both The Computer Journal 24(2), 1981.
+// Predicates are filtered: double with a bound after J. R. Shewchuk, Adaptive Precision Floating-Point
+// Arithmetic and Fast Robust Geometric Predicates, 1997, else GMP.
 
 #include <gmpxx.h>
 
@@ -23,11 +24,15 @@ using Face = std::array<std::int32_t, 3>;
 template <class Number>
 Number inSphereDeterminant(const std::array<std::array<Number, 3>, 4>& r) {
     const auto minor = [&](std::size_t i, std::size_t j, std::size_t k) {
-        return Number(r[i][0] * (r[j][1] * r[k][2] - r[j][2] * r[k][1]) + r[i][1] * (r[j][2] * r[k][0] - r[j][0] * r[k][2]) +
+        return Number(r[i][0] * (r[j][1] * r[k][2] - r[j][2] * r[k][1]) +
+                      r[i][1] * (r[j][2] * r[k][0] - r[j][0] * r[k][2]) +
                       r[i][2] * (r[j][0] * r[k][1] - r[j][1] * r[k][0]));
     };
-    const auto square = [&](std::size_t i) { return Number(r[i][0] * r[i][0] + r[i][1] * r[i][1] + r[i][2] * r[i][2]); };
-    return square(0) * minor(1, 2, 3) - square(1) * minor(0, 2, 3) + square(2) * minor(0, 1, 3) - square(3) * minor(0, 1, 2);
+    const auto square = [&](std::size_t i) {
+        return Number(r[i][0] * r[i][0] + r[i][1] * r[i][1] + r[i][2] * r[i][2]);
+    };
+    return square(0) * minor(1, 2, 3) - square(1) * minor(0, 2, 3) + square(2) * minor(0, 1, 3) -
+           square(3) * minor(0, 1, 2);
 }
 
 /// p lies strictly inside the sphere through the nodes of a positive tet.
@@ -57,7 +62,9 @@ class Delaunay {
         for (const Vec3d& p : points_)
             TESSERA_CHECK(glm::length(p) <= 100, "Delaunay points lie within 100 of the origin");
         constexpr double kFar = 1e4;
-        points_.insert(points_.end(), {{kFar, kFar, kFar}, {kFar, -kFar, -kFar}, {-kFar, kFar, -kFar}, {-kFar, -kFar, kFar}});
+        points_.insert(
+            points_.end(),
+            {{kFar, kFar, kFar}, {kFar, -kFar, -kFar}, {-kFar, kFar, -kFar}, {-kFar, -kFar, kFar}});
         add({n, n + 1, n + 2, n + 3});
         for (std::int32_t p = 0; p < n; ++p) insert(p);
     }
@@ -67,7 +74,8 @@ class Delaunay {
         const auto n = std::int32_t(points_.size()) - 4;
         result.points.assign(points_.begin(), points_.end() - 4);
         for (const Tet& t : tets_)
-            if (std::all_of(t.begin(), t.end(), [&](std::int32_t node) { return node < n; })) result.tets.push_back(t);
+            if (std::all_of(t.begin(), t.end(), [&](std::int32_t node) { return node < n; }))
+                result.tets.push_back(t);
         return result;
     }
 
@@ -108,6 +116,8 @@ class Delaunay {
 
 }  // namespace
 
-TetMesh delaunayMesh(std::span<const Vec3d> points) { return Delaunay(points).mesh(); }
+TetMesh delaunayMesh(std::span<const Vec3d> points) {
+    return Delaunay(points).mesh();
+}
 
 }  // namespace tessera

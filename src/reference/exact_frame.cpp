@@ -9,13 +9,17 @@
 
 namespace tessera {
 
-ExactVec operator-(const ExactVec& a, const ExactVec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+ExactVec operator-(const ExactVec& a, const ExactVec& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
 
 ExactVec cross(const ExactVec& a, const ExactVec& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-mpz_class dot(const ExactVec& a, const ExactVec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+mpz_class dot(const ExactVec& a, const ExactVec& b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 double approximateRatio(const mpz_class& num, const mpz_class& den) {
     long numExponent = 0, denExponent = 0;
@@ -71,7 +75,8 @@ ExactFrame::ExactFrame(const TetMesh& mesh, const Lattice& lattice) {
         for (const std::int32_t n : tet) used[std::size_t(n)] = 1;
 
     Scale scale;
-    for (const Vec3d& v : {lattice.originWorld, lattice.uWorld, lattice.vWorld, lattice.wWorld}) scale.include(v);
+    for (const Vec3d& v : {lattice.originWorld, lattice.uWorld, lattice.vWorld, lattice.wWorld})
+        scale.include(v);
     for (std::size_t n = 0; n < used.size(); ++n)
         if (used[n]) scale.include(mesh.points[n]);
 
@@ -81,7 +86,7 @@ ExactFrame::ExactFrame(const TetMesh& mesh, const Lattice& lattice) {
     unit_ = dot(u, rowX);
     TESSERA_CHECK(unit_ != 0, "the lattice's frame vectors are linearly dependent");
     const bool isCubic = lattice.isAxisParallel() && u.x == v.y && u.x == w.z;
-    if (isCubic) {   // the same space with numbers a third as long
+    if (isCubic) {  // the same space with numbers a third as long
         unit_ = u.x;
         rowX = {1, 0, 0}, rowY = {0, 1, 0}, rowZ = {0, 0, 1};
     }
@@ -101,6 +106,8 @@ ExactFrame::ExactFrame(const TetMesh& mesh, const Lattice& lattice) {
     }
 }
 
-ExactVec ExactFrame::latticePoint(const Vec3i& p) const { return {unit_ * p.x, unit_ * p.y, unit_ * p.z}; }
+ExactVec ExactFrame::latticePoint(const Vec3i& p) const {
+    return {unit_ * p.x, unit_ * p.y, unit_ * p.z};
+}
 
 }  // namespace tessera

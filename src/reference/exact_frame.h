@@ -19,12 +19,14 @@ ExactVec operator-(const ExactVec& a, const ExactVec& b);
 ExactVec cross(const ExactVec& a, const ExactVec& b);
 mpz_class dot(const ExactVec& a, const ExactVec& b);
 
-/// num / den in double, within 2^-50 of the quotient relatively, for numbers of any size. @param den not zero.
+/// num / den in double, within 2^-50 of the quotient relatively, for numbers of any size. @param den not
+/// zero.
 double approximateRatio(const mpz_class& num, const mpz_class& den);
 
-/// The nodes of a mesh in the index space of a lattice, without rounding. Every double is an integer times a power of two, so after scaling by
-/// a common power all coordinates are integers; index space is reached with the adjugate of the frame matrix, and the
-/// determinant stays as a common denominator. Lattice points are integer multiples of that denominator.
+/// The nodes of a mesh in the index space of a lattice, without rounding. Every double is an integer times a
+/// power of two, so after scaling by a common power all coordinates are integers; index space is reached with
+/// the adjugate of the frame matrix, and the determinant stays as a common denominator. Lattice points are
+/// integer multiples of that denominator.
 class ExactFrame {
   public:
     /// Throws InternalError when the frame vectors are linearly dependent or a used node isn't finite.

@@ -16,7 +16,9 @@ int append(TetMesh& mesh, Field field) {
 
 }  // namespace
 
-double wavyField(const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; }
+double wavyField(const Vec3d& p) {
+    return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z;
+}
 
 int addPointField(TetMesh& mesh, const std::string& name, const std::vector<PlaceFunction>& components) {
     Field field{name, FieldLocation::point, int(components.size()), {}};
@@ -35,12 +37,13 @@ int addCellField(TetMesh& mesh, const std::string& name, const std::vector<Place
     return append(mesh, std::move(field));
 }
 
-int addRandomField(TetMesh& mesh, const std::string& name, FieldLocation location, int components, double offset,
-                   double scale, std::uint64_t seed) {
+int addRandomField(TetMesh& mesh, const std::string& name, FieldLocation location, int components,
+                   double offset, double scale, std::uint64_t seed) {
     Field field{name, location, components, {}};
     const std::int64_t items = location == FieldLocation::point ? mesh.nodeCount() : mesh.elementCount();
     Random random(seed);
-    for (std::int64_t i = 0; i < items * components; ++i) field.values.push_back(offset + scale * random.centred());
+    for (std::int64_t i = 0; i < items * components; ++i)
+        field.values.push_back(offset + scale * random.centred());
     return append(mesh, std::move(field));
 }
 

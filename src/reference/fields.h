@@ -21,8 +21,8 @@ int addPointField(TetMesh& mesh, const std::string& name, const std::vector<Plac
 /// A cell field with the functions' values at the centroids.
 int addCellField(TetMesh& mesh, const std::string& name, const std::vector<PlaceFunction>& components);
 /// A point or cell field of numbers offset + scale x [-1, 1), independent from item to item.
-int addRandomField(TetMesh& mesh, const std::string& name, FieldLocation location, int components, double offset,
-                   double scale, std::uint64_t seed);
+int addRandomField(TetMesh& mesh, const std::string& name, FieldLocation location, int components,
+                   double offset, double scale, std::uint64_t seed);
 /// A cell field that tells which element owns a point: its index, exact in float up to 2^24.
 int addElementIdField(TetMesh& mesh, const std::string& name);
 /// A copy of the field with NaN, +infinity and -infinity in turn at every `stride`-th item, first component.

@@ -41,7 +41,8 @@ void splitInFive(const NodeGrid& grid, const Vec3i& cell, std::vector<Tet>& tets
         const int x = (i & 1) ^ flip;
         return grid.node(cell + Vec3i(x, (i >> 1) & 1, i >> 2));
     };
-    static constexpr int kCorners[5][4] = {{0, 3, 5, 6}, {1, 0, 3, 5}, {2, 0, 6, 3}, {4, 0, 5, 6}, {7, 3, 6, 5}};
+    static constexpr int kCorners[5][4] = {
+        {0, 3, 5, 6}, {1, 0, 3, 5}, {2, 0, 6, 3}, {4, 0, 5, 6}, {7, 3, 6, 5}};
     for (const auto& c : kCorners) tets.push_back({corner(c[0]), corner(c[1]), corner(c[2]), corner(c[3])});
 }
 
@@ -94,7 +95,8 @@ TetMesh sphereMesh(int n) {
     TetMesh mesh = boxMesh({.cells = Vec3i(n), .originWorld = Vec3d(-1), .sizeWorld = Vec3d(2)});
     for (Vec3d& p : mesh.points) {
         const Vec3d s = p * p;
-        p = {p.x * std::sqrt(1 - s.y / 2 - s.z / 2 + s.y * s.z / 3), p.y * std::sqrt(1 - s.z / 2 - s.x / 2 + s.z * s.x / 3),
+        p = {p.x * std::sqrt(1 - s.y / 2 - s.z / 2 + s.y * s.z / 3),
+             p.y * std::sqrt(1 - s.z / 2 - s.x / 2 + s.z * s.x / 3),
              p.z * std::sqrt(1 - s.x / 2 - s.y / 2 + s.x * s.y / 3)};
     }
     return mesh;
@@ -142,16 +144,22 @@ TetMesh thinTetsMesh(ThinKind kind, double aspect, double size, int count, std::
         const auto wobble = [&](double s) { return s * (0.5 + random.unit()); };
         std::array<Vec3d, 4> at;
         switch (kind) {
-            case ThinKind::sliver:   // a square, bent by a hair along its diagonal
+            case ThinKind::sliver:  // a square, bent by a hair along its diagonal
                 at = {{{1, 0, wobble(aspect)}, {0, 1, 0}, {-1, 0, wobble(aspect)}, {0, -1, 0}}};
                 break;
-            case ThinKind::needle:   // a small triangle and a node far away
-                at = {{{wobble(aspect), 0, 0}, {0, wobble(aspect), 0}, {-wobble(aspect), -wobble(aspect), 0}, {0, 0, 1}}};
+            case ThinKind::needle:  // a small triangle and a node far away
+                at = {{{wobble(aspect), 0, 0},
+                       {0, wobble(aspect), 0},
+                       {-wobble(aspect), -wobble(aspect), 0},
+                       {0, 0, 1}}};
                 break;
-            case ThinKind::spindle:   // two short edges far from each other
-                at = {{{wobble(aspect), 0, -1}, {-wobble(aspect), 0, -1}, {0, wobble(aspect), 1}, {0, -wobble(aspect), 1}}};
+            case ThinKind::spindle:  // two short edges far from each other
+                at = {{{wobble(aspect), 0, -1},
+                       {-wobble(aspect), 0, -1},
+                       {0, wobble(aspect), 1},
+                       {0, -wobble(aspect), 1}}};
                 break;
-            case ThinKind::cap:   // a node close above the middle of a triangle
+            case ThinKind::cap:  // a node close above the middle of a triangle
                 at = {{{1, 0, 0}, {-0.5, 0.8, 0}, {-0.5, -0.8, 0}, {0.1, 0.05, wobble(aspect)}}};
                 break;
         }
@@ -182,7 +190,9 @@ TetMesh integerTetsMesh(int extent, int count, std::uint64_t seed) {
     Random random(seed);
     while (mesh.elementCount() < count) {
         std::array<Vec3d, 4> at;
-        for (Vec3d& p : at) p = {double(random.below(extent + 1)), double(random.below(extent + 1)), double(random.below(extent + 1))};
+        for (Vec3d& p : at)
+            p = {double(random.below(extent + 1)), double(random.below(extent + 1)),
+                 double(random.below(extent + 1))};
         if (volumeSign(at[0], at[1], at[2], at[3]) == 0) continue;
         const auto first = std::int32_t(mesh.points.size());
         const Vec3d shift{double(mesh.elementCount() * (extent + 2)), 0, 0};
@@ -220,8 +230,8 @@ void addFlatElements(TetMesh& mesh) {
         const auto [a, b, c, d] = tets[e];
         const Vec3d pa = mesh.points[std::size_t(a)], pb = mesh.points[std::size_t(b)];
         const auto extra = std::int32_t(mesh.points.size());
-        mesh.points.push_back(pa);                        // coincident with a
-        mesh.points.push_back(pb + (pb - pa));            // on the line through a and b, but for rounding
+        mesh.points.push_back(pa);              // coincident with a
+        mesh.points.push_back(pb + (pb - pa));  // on the line through a and b, but for rounding
         mesh.tets.push_back({a, b, c, a});
         mesh.tets.push_back({a, b, c, extra});
         mesh.tets.push_back({d, d, d, d});

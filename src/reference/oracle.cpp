@@ -10,13 +10,15 @@ namespace tessera {
 struct Oracle::Corners {
     std::array<ExactVec, 4> at;
 
-    /// Six times the signed volumes of the four tetrahedra that the origin spans with the faces; entry i leaves out node i.
+    /// Six times the signed volumes of the four tetrahedra that the origin spans with the faces; entry i
+    /// leaves out node i.
     std::array<mpz_class, 4> volumes() const {
         const auto& [a, b, c, d] = at;
         const ExactVec cd = cross(c, d), ab = cross(a, b);
         return {dot(b, cd), -dot(a, cd), dot(d, ab), -dot(c, ab)};
     }
-    /// Normals of the faces opposite to each node, all pointing inward for a positive element (outward for a negative one); length twice the area.
+    /// Normals of the faces opposite to each node, all pointing inward for a positive element (outward for a
+    /// negative one); length twice the area.
     std::array<ExactVec, 4> normals() const {
         const auto& [a, b, c, d] = at;
         const ExactVec ab = b - a, ac = c - a, ad = d - a, bc = c - b, bd = d - b;
@@ -24,7 +26,8 @@ struct Oracle::Corners {
     }
 };
 
-Oracle::Oracle(const TetMesh& mesh, const Lattice& lattice) : mesh_(&mesh), lattice_(lattice), frame_(mesh, lattice) {}
+Oracle::Oracle(const TetMesh& mesh, const Lattice& lattice)
+    : mesh_(&mesh), lattice_(lattice), frame_(mesh, lattice) {}
 
 Oracle::Corners Oracle::cornersFrom(std::int64_t element, const ExactVec& origin) const {
     const auto& tet = mesh_->tets[std::size_t(element)];
@@ -39,7 +42,9 @@ int Oracle::volumeSign(std::int64_t element) const {
 
 namespace {
 
-mpz_class sum(const std::array<mpz_class, 4>& v) { return v[0] + v[1] + v[2] + v[3]; }
+mpz_class sum(const std::array<mpz_class, 4>& v) {
+    return v[0] + v[1] + v[2] + v[3];
+}
 
 mpq_class ratio(const mpz_class& num, const mpz_class& den) {
     mpq_class q(num, den);
@@ -47,7 +52,8 @@ mpq_class ratio(const mpz_class& num, const mpz_class& den) {
     return q;
 }
 
-/// A place in an element as integer weights over their common denominator, with the square of its distance from the origin over the same.
+/// A place in an element as integer weights over their common denominator, with the square of its distance
+/// from the origin over the same.
 struct Place {
     mpz_class squared, denominator = 1;
     std::array<mpz_class, 4> weights;
@@ -72,7 +78,8 @@ void offerEdge(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, 
 
 void offerFace(const std::array<ExactVec, 4>& at, std::size_t i, std::size_t j, std::size_t k, Place& best) {
     const ExactVec normal = cross(at[j] - at[i], at[k] - at[i]);
-    // Areas of the three triangles that the origin's projection spans with the edges, times the length of the normal.
+    // Areas of the three triangles that the origin's projection spans with the edges, times the length of the
+    // normal.
     Place place;
     place.weights[i] = dot(normal, cross(at[j], at[k]));
     place.weights[j] = dot(normal, cross(at[k], at[i]));
@@ -99,7 +106,8 @@ ExactWeights Oracle::barycentrics(std::int64_t element, const Vec3i& p) const {
     const auto volumes = cornersFrom(element, frame_.latticePoint(p)).volumes();
     const mpz_class whole = sum(volumes);
     TESSERA_CHECK(whole != 0, "a flat element has no barycentric coordinates");
-    return {ratio(volumes[0], whole), ratio(volumes[1], whole), ratio(volumes[2], whole), ratio(volumes[3], whole)};
+    return {ratio(volumes[0], whole), ratio(volumes[1], whole), ratio(volumes[2], whole),
+            ratio(volumes[3], whole)};
 }
 
 std::array<double, 4> Oracle::approximateBarycentrics(std::int64_t element, const Vec3i& p) const {
@@ -145,7 +153,8 @@ double Oracle::depthVoxels(std::int64_t element, const Vec3i& p) const {
     return depth;
 }
 
-mpq_class Oracle::interpolate(const Field& field, int component, std::int64_t element, const ExactWeights& weights) const {
+mpq_class Oracle::interpolate(const Field& field, int component, std::int64_t element,
+                              const ExactWeights& weights) const {
     mpq_class value;
     const auto& tet = mesh_->tets[std::size_t(element)];
     for (std::size_t i = 0; i < 4; ++i)

@@ -14,12 +14,13 @@ using ExactWeights = std::array<mpq_class, 4>;
 
 /// The point of a closed element nearest to a lattice point.
 struct ExactNearest {
-    ExactWeights weights;         ///< none negative
-    mpq_class squaredDistance;    ///< voxel units squared; 0 when the lattice point lies in the element
+    ExactWeights weights;       ///< none negative
+    mpq_class squaredDistance;  ///< voxel units squared; 0 when the lattice point lies in the element
 };
 
-/// Exact answers about one mesh on one lattice, in rational arithmetic. All lengths are in voxels: Euclidean in index space, which for a
-/// lattice of one spacing is world distance over spacing. The mesh must outlive the oracle. Thread-safe.
+/// Exact answers about one mesh on one lattice, in rational arithmetic. All lengths are in voxels: Euclidean
+/// in index space, which for a lattice of one spacing is world distance over spacing. The mesh must outlive
+/// the oracle. Thread-safe.
 class Oracle {
   public:
     Oracle(const TetMesh& mesh, const Lattice& lattice);
@@ -43,8 +44,10 @@ class Oracle {
     /// Signed distance to the nearest face plane, negative outside, within 2^-48 relatively.
     double depthVoxels(std::int64_t element, const Vec3i& p) const;
 
-    /// Linear interpolation with the field's node values in double. @param field a point field, finite on the element.
-    mpq_class interpolate(const Field& field, int component, std::int64_t element, const ExactWeights& weights) const;
+    /// Linear interpolation with the field's node values in double. @param field a point field, finite on the
+    /// element.
+    mpq_class interpolate(const Field& field, int component, std::int64_t element,
+                          const ExactWeights& weights) const;
     /// Squared Euclidean norm of the field's gradient, per voxel squared. @param field as above.
     mpq_class squaredGradient(const Field& field, int component, std::int64_t element) const;
 

@@ -7,8 +7,8 @@
 namespace tessera {
 
 /// Pseudo-random numbers that are the same on every platform and library.
-/// Based on: S. Vigna, the splitmix64 generator (public domain), after G. Steele, D. Lea and C. Flood, Fast Splittable
-/// Pseudorandom Number Generators, OOPSLA 2014.
+/// Based on: S. Vigna, the splitmix64 generator (public domain), after G. Steele, D. Lea and C. Flood, Fast
+/// Splittable Pseudorandom Number Generators, OOPSLA 2014.
 class Random {
   public:
     explicit Random(std::uint64_t seed) : state_(seed) {}

@@ -62,8 +62,8 @@ class FilteredElement {
         return isSound_ && depth > kClearVoxels ? Verdict::in : Verdict::doubtful;
     }
 
-    /// Bounds of the true distance. Any point of the element gives an upper one; the nodes' least extent along any direction
-    /// gives a lower one.
+    /// Bounds of the true distance. Any point of the element gives an upper one; the nodes' least extent
+    /// along any direction gives a lower one.
     void boundDistance(const Vec3d& p, double& least, double& most) const {
         std::array<Vec3d, 4> at;
         for (std::size_t i = 0; i < 4; ++i) at[i] = nodes_[i] - p;
@@ -95,7 +95,8 @@ class FilteredElement {
                     const Vec3d normal = cross(edge, at[k] - at[i]);
                     const double wi = dot(normal, cross(at[j], at[k])), wj = dot(normal, cross(at[k], at[i])),
                                  wk = dot(normal, cross(at[i], at[j]));
-                    if (wi > 0 && wj > 0 && wk > 0) offer((wi * at[i] + wj * at[j] + wk * at[k]) / (wi + wj + wk));
+                    if (wi > 0 && wj > 0 && wk > 0)
+                        offer((wi * at[i] + wj * at[j] + wk * at[k]) / (wi + wj + wk));
                 }
             }
         }
@@ -103,21 +104,23 @@ class FilteredElement {
     }
 
     struct Plane {
-        Vec3d inward{0};   ///< length: twice the face's area
+        Vec3d inward{0};  ///< length: twice the face's area
         Vec3d node{0};
         double inverseLength = 0;
-        double outBelow = 0;   ///< when the volume is below, the point is further out than the tolerance
+        double outBelow = 0;  ///< when the volume is below, the point is further out than the tolerance
     };
 
     void setPlanes(const std::array<Vec3d, 4>& at, double placeError, double tolerance) {
         const Vec3d extent = box_.size();
         const double length = std::max({extent.x, extent.y, extent.z});
-        // Every difference of places in the box is within `slip` of the true one; a product of three of them in the
-        // determinant then errs by under 18 length^2 slip from the places and 15 length^2 slip from rounding.
+        // Every difference of places in the box is within `slip` of the true one; a product of three of them
+        // in the determinant then errs by under 18 length^2 slip from the places and 15 length^2 slip from
+        // rounding.
         const double slip = 2 * placeError + std::ldexp(length, -52);
         const double volumeError = 64 * length * length * slip + 1e-280;
         const double normalError = 16 * length * slip + 1e-280;
-        static constexpr std::array<std::array<std::size_t, 3>, 4> kFaces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+        static constexpr std::array<std::array<std::size_t, 3>, 4> kFaces{
+            {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
         isSound_ = true;
         for (std::size_t i = 0; i < 4; ++i) {
             const Vec3d a = at[kFaces[i][0]], b = at[kFaces[i][1]], c = at[kFaces[i][2]];
@@ -141,8 +144,8 @@ class FilteredElement {
 };
 
 /// Decides one pair in rational arithmetic; false when the point is further away than the tolerance.
-bool decideExactly(const Oracle& oracle, const FilteredElement& filter, const Vec3i& p, const ReferenceOptions& options,
-                   Candidate& candidate) {
+bool decideExactly(const Oracle& oracle, const FilteredElement& filter, const Vec3i& p,
+                   const ReferenceOptions& options, Candidate& candidate) {
     const double tolerance = options.toleranceVoxels;
     const std::int64_t element = candidate.element;
     double least = 0, most = std::numeric_limits<double>::infinity();
@@ -164,12 +167,13 @@ bool decideExactly(const Oracle& oracle, const FilteredElement& filter, const Ve
 
 std::uint32_t offsetIn(const IndexBox& box, const Vec3i& p) {
     const Vec3i n = box.size(), q = p - box.min;
-    return (std::uint32_t(q.z) * std::uint32_t(n.y) + std::uint32_t(q.y)) * std::uint32_t(n.x) + std::uint32_t(q.x);
+    return (std::uint32_t(q.z) * std::uint32_t(n.y) + std::uint32_t(q.y)) * std::uint32_t(n.x) +
+           std::uint32_t(q.x);
 }
 
 /// The candidates among the points of one element.
-std::int64_t findPoints(const Oracle& oracle, std::int64_t element, const IndexBox& box, const ReferenceOptions& options,
-                        std::vector<Found>& found) {
+std::int64_t findPoints(const Oracle& oracle, std::int64_t element, const IndexBox& box,
+                        const ReferenceOptions& options, std::vector<Found>& found) {
     const FilteredElement filter(oracle, element, options.toleranceVoxels);
     const IndexBox points = filter.points(box);
     if (points.empty() || oracle.volumeSign(element) == 0) return 0;
@@ -201,7 +205,8 @@ ReferenceBlock referenceBlock(const Oracle& oracle, const IndexBox& box, const R
     std::vector<std::int64_t> exactPairs(found.size(), 0);
     parallelForChunks(execution, elements, chunk, [&](std::int64_t begin, std::int64_t end) {
         const auto c = std::size_t(begin / chunk);
-        for (std::int64_t e = begin; e < end; ++e) exactPairs[c] += findPoints(oracle, e, box, options, found[c]);
+        for (std::int64_t e = begin; e < end; ++e)
+            exactPairs[c] += findPoints(oracle, e, box, options, found[c]);
     });
 
     ReferenceBlock result;
@@ -211,7 +216,8 @@ ReferenceBlock referenceBlock(const Oracle& oracle, const IndexBox& box, const R
     result.firstCandidate.assign(std::size_t(box.count()) + 1, 0);
     for (const auto& list : found)
         for (const Found& f : list) ++result.firstCandidate[f.offset + 1];
-    for (std::size_t i = 1; i < result.firstCandidate.size(); ++i) result.firstCandidate[i] += result.firstCandidate[i - 1];
+    for (std::size_t i = 1; i < result.firstCandidate.size(); ++i)
+        result.firstCandidate[i] += result.firstCandidate[i - 1];
     result.candidates.resize(result.firstCandidate.back());
     std::vector<std::uint32_t> next(result.firstCandidate.begin(), result.firstCandidate.end() - 1);
     for (const auto& list : found)

@@ -92,4 +92,6 @@ double ElementDepth::at(const Vec3i& point) const {
     return depth;
 }
 
+double ElementDepth::rank(const Vec3i& point) const { return std::floor(at(point) * 0x1p13 + 0.5); }
+
 }  // namespace tessera

@@ -258,7 +258,7 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
                 } else {
                     ++counts.contested;
                     if (!depth) depth.emplace(input.mesh, input.frame, element);
-                    if (!contestPoint(input, output, element, *depth, point)) continue;
+                    if (!contestPoint(input, output, element, depth->rank(point), offset)) continue;
                 }
                 Real barycentric[4];
                 for (int k = 0; k < 4; ++k)
@@ -335,19 +335,16 @@ void ExactScanlines::ends(double atT, double atR, double& begin, double& end) co
     }
 }
 
-bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ElementDepth& depth,
-                  const Vec3i& point) {
-    const std::int64_t offset = output.offset(point);
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank, std::int64_t offset) {
     std::int32_t& owner = output.owner[offset];
     const std::int32_t present = owner & kElementMask;
-    if (!(owner & kDepthKnown)) {
-        output.depth[offset] = ElementDepth(input.mesh, input.frame, present).at(point);
-        owner |= kDepthKnown;
+    if (!(owner & kRankKnown)) {
+        output.rank[offset] = ElementDepth(input.mesh, input.frame, present).rank(output.pointAt(offset));
+        owner |= kRankKnown;
     }
-    const double deep = depth.at(point);
-    if (deep < output.depth[offset] || (deep == output.depth[offset] && element > present)) return false;
-    owner = element | kDepthKnown;
-    output.depth[offset] = deep;
+    if (rank < output.rank[offset] || (rank == output.rank[offset] && element > present)) return false;
+    owner = element | kRankKnown;
+    output.rank[offset] = rank;
     return true;
 }
 

@@ -30,9 +30,9 @@ struct ScanInput {
     std::span<const ScanChannel> channels;
 };
 
-/// Bit of `owner` that says that `depth` holds the owner's depth.
-inline constexpr std::int32_t kDepthKnown = 1 << 30;
-inline constexpr std::int32_t kElementMask = kDepthKnown - 1;
+/// Bit of `owner` that says that `rank` holds the owner's rank.
+inline constexpr std::int32_t kRankKnown = 1 << 30;
+inline constexpr std::int32_t kElementMask = kRankKnown - 1;
 inline constexpr std::int32_t kNoOwner = -1;
 
 /// Where the samples go: arrays over `blockBox`, of which a scan fills only `region`.
@@ -41,8 +41,8 @@ struct ScanOutput {
     IndexBox blockBox;
     std::int64_t stride[3];            ///< of x, y and z: 1, nx, nx ny
     std::span<float* const> values;    ///< one array a channel
-    std::int32_t* owner;               ///< kNoOwner, or the covering element, perhaps with kDepthKnown
-    double* depth;                     ///< written when a point becomes contested
+    std::int32_t* owner;               ///< kNoOwner, or the covering element, perhaps with kRankKnown
+    double* rank;                      ///< ElementDepth::rank of the owner, written when a point becomes contested
 
     std::int64_t offset(const Vec3i& p) const {
         const Vec3i q = p - blockBox.min;
@@ -59,9 +59,8 @@ struct ScanCounts {
     std::int64_t exactElements = 0;
 };
 
-/// True when `element`, which covers the point, owns it rather than the present owner. Updates owner and depth, not the values.
-bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ElementDepth& depth,
-                  const Vec3i& point);
+/// True when `element`, which covers the point with this rank, owns it rather than the present owner. Updates owner and rank, not the values.
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank, std::int64_t offset);
 
 /// Samples one element in 113-bit arithmetic or, where that isn't enough, in rationals.
 void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts);

@@ -41,8 +41,8 @@ void checkLattice(const Lattice& lattice, std::span<const IndexBox> boxes) {
 struct Work {
     Block block;
     std::vector<std::int32_t> owner;
-    std::unique_ptr<double[]> depth;   // meaningful only where owner has kDepthKnown
-    std::size_t depthSize = 0;
+    std::unique_ptr<double[]> rank;   // meaningful only where owner has kRankKnown
+    std::size_t rankSize = 0;
     std::vector<float*> channelValues;
     std::atomic<int> regionsLeft{0};
 
@@ -54,9 +54,9 @@ struct Work {
         block.values.resize(count * std::size_t(channels));
         block.coverage.resize(count);
         owner.resize(count);
-        if (depthSize < count) {
-            depth.reset(new double[count]);
-            depthSize = count;
+        if (rankSize < count) {
+            rank.reset(new double[count]);
+            rankSize = count;
         }
         channelValues.resize(std::size_t(channels));
         for (std::size_t c = 0; c < channelValues.size(); ++c) channelValues[c] = block.values.data() + c * count;
@@ -193,7 +193,7 @@ class BoundSoftware : public BoundResampler {
                                 {1, size.x, std::int64_t(size.x) * size.y},
                                 work.channelValues,
                                 work.owner.data(),
-                                work.depth.get()};
+                                work.rank.get()};
         const std::int64_t rowLength = region.size().x;
         const auto forEachRow = [&](const auto& visit) {
             for (int z = region.min.z; z < region.max.z; ++z)

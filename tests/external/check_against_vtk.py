@@ -228,8 +228,8 @@ def check_values(tets, samples, inside, probed, verdict):
     verdict.inside += len(both)
     for key, stored in samples.values.items():
         field = tets.fields[key]
-        width = max(float((field.max(axis=0) - field.min(axis=0)).max()), 1e-300)
         largest = float(np.abs(field).max())
+        width = float((field.max(axis=0) - field.min(axis=0)).max()) or largest or 1.0
         difference = np.abs(stored[both].astype(float) - probed[key][both]).max(axis=1)
         close = difference <= 4 * FLOAT_ULP * largest
         if close.any():
