@@ -1,5 +1,6 @@
-// Times Tessera against vtkResampleToImage, in one process, runs interleaved: everything after reading and before writing.
-// compare_vtk mesh.vtu [--runs 5] [--threads 2] [--points 64,128,256] [--csv bench/results/compare_vtk.csv]
+// Times Tessera against vtkResampleToImage, in one process, runs interleaved: everything after reading and
+// before writing. compare_vtk mesh.vtu [--runs 5] [--threads 2] [--points 64,128,256] [--csv
+// bench/results/compare_vtk.csv]
 
 #include <fmt/format.h>
 
@@ -24,7 +25,7 @@ struct Sample {
     double vtkMs = 0, planMs = 0, resampleMs = 0, verifyMs = 0, totalMs = 0;
 };
 
-double median(const std::vector<Sample>& samples, double Sample::* figure) {
+double median(const std::vector<Sample>& samples, double Sample::*figure) {
     std::vector<double> values;
     for (const Sample& s : samples) values.push_back(s.*figure);
     std::sort(values.begin(), values.end());
@@ -32,8 +33,8 @@ double median(const std::vector<Sample>& samples, double Sample::* figure) {
     return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
 }
 
-Sample runOnce(const tessera::TetMesh& mesh, const std::vector<int>& fields, const tessera::bench::VtkResample& vtk, int points,
-               int threads) {
+Sample runOnce(const tessera::TetMesh& mesh, const std::vector<int>& fields,
+               const tessera::bench::VtkResample& vtk, int points, int threads) {
     Sample sample;
     sample.vtkMs = vtk.run(points);
     tessera::RefineOptions options;
@@ -51,16 +52,18 @@ Sample runOnce(const tessera::TetMesh& mesh, const std::vector<int>& fields, con
     return sample;
 }
 
-int compare(const std::string& path, const std::string& csvPath, const std::vector<int>& sizes, int runs, int threads) {
+int compare(const std::string& path, const std::string& csvPath, const std::vector<int>& sizes, int runs,
+            int threads) {
     const tessera::bench::VtkResample vtk(path, threads);
     const tessera::MeshFile file = tessera::readMesh(path, {}, {});
     std::vector<int> fields(file.mesh.fields.size());
     std::iota(fields.begin(), fields.end(), 0);
-    fmt::print("{} elements, {} threads, VTK backend {}, median of {} interleaved runs, milliseconds\n", file.mesh.elementCount(), threads,
-               vtk.backend(), runs);
-    fmt::print("{:>8} {:>10} {:>8} {:>10} {:>8} {:>10} {:>14} {:>8} {:>14}\n", "points", "VTK", "plan", "resample", "verify", "total",
-               "without verify", "ratio", "without verify");
-    std::string csv = "points,threads,runs,vtk_ms,plan_ms,resample_ms,verify_ms,total_ms,ratio,ratio_without_verify\n";
+    fmt::print("{} elements, {} threads, VTK backend {}, median of {} interleaved runs, milliseconds\n",
+               file.mesh.elementCount(), threads, vtk.backend(), runs);
+    fmt::print("{:>8} {:>10} {:>8} {:>10} {:>8} {:>10} {:>14} {:>8} {:>14}\n", "points", "VTK", "plan",
+               "resample", "verify", "total", "without verify", "ratio", "without verify");
+    std::string csv =
+        "points,threads,runs,vtk_ms,plan_ms,resample_ms,verify_ms,total_ms,ratio,ratio_without_verify\n";
     for (const int points : sizes) {
         std::vector<Sample> samples;
         for (int r = 0; r < runs; ++r) samples.push_back(runOnce(file.mesh, fields, vtk, points, threads));
@@ -70,13 +73,14 @@ int compare(const std::string& path, const std::string& csvPath, const std::vect
         std::vector<Sample> bare = samples;
         for (Sample& s : bare) s.totalMs -= s.verifyMs;
         const double bareMs = median(bare, &Sample::totalMs);
-        fmt::print("{:>7}^3 {:>9.0f} {:>8.1f} {:>10.1f} {:>8.1f} {:>10.1f} {:>14.1f} {:>8.1f} {:>14.1f}\n", points, vtkMs, plan, resample,
-                   verify, totalMs, bareMs, vtkMs / totalMs, vtkMs / bareMs);
+        fmt::print("{:>7}^3 {:>9.0f} {:>8.1f} {:>10.1f} {:>8.1f} {:>10.1f} {:>14.1f} {:>8.1f} {:>14.1f}\n",
+                   points, vtkMs, plan, resample, verify, totalMs, bareMs, vtkMs / totalMs, vtkMs / bareMs);
         std::fflush(stdout);
-        csv += fmt::format("{},{},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.1f},{:.2f},{:.2f}\n", points, threads, runs, vtkMs, plan, resample,
-                           verify, totalMs, vtkMs / totalMs, vtkMs / bareMs);
+        csv += fmt::format("{},{},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.1f},{:.2f},{:.2f}\n", points, threads,
+                           runs, vtkMs, plan, resample, verify, totalMs, vtkMs / totalMs, vtkMs / bareMs);
     }
-    if (!csvPath.empty() && !(std::ofstream(csvPath) << csv)) throw std::runtime_error(csvPath + ": can't be written");
+    if (!csvPath.empty() && !(std::ofstream(csvPath) << csv))
+        throw std::runtime_error(csvPath + ": can't be written");
     return 0;
 }
 

@@ -21,7 +21,8 @@ VtkResample::VtkResample(const std::string& path, int threads) : impl_(new Impl)
     vtkSMPTools::Initialize(threads);
     impl_->reader->SetFileName(path.c_str());
     impl_->reader->Update();
-    if (impl_->reader->GetOutput()->GetNumberOfCells() == 0) throw std::runtime_error(path + ": VTK read no cells");
+    if (impl_->reader->GetOutput()->GetNumberOfCells() == 0)
+        throw std::runtime_error(path + ": VTK read no cells");
 }
 
 VtkResample::~VtkResample() = default;
@@ -41,6 +42,8 @@ double VtkResample::run(int points) const {
     return elapsed.count();
 }
 
-std::string VtkResample::backend() const { return vtkSMPTools::GetBackend(); }
+std::string VtkResample::backend() const {
+    return vtkSMPTools::GetBackend();
+}
 
 }  // namespace tessera::bench

@@ -7,10 +7,15 @@
 namespace tessera {
 namespace {
 
-bool isCovered(const Vec3i& p) { return (p.x * 7 + p.y * 5 + p.z * 3) % 4 != 0; }
-float valueAt(const Vec3i& p, int channel) { return float(p.x + 100 * p.y + 10000 * p.z) + 0.25f * float(channel); }
+bool isCovered(const Vec3i& p) {
+    return (p.x * 7 + p.y * 5 + p.z * 3) % 4 != 0;
+}
+float valueAt(const Vec3i& p, int channel) {
+    return float(p.x + 100 * p.y + 10000 * p.z) + 0.25f * float(channel);
+}
 
-// A block larger than the brick and not aligned with it. Values where nothing is covered are garbage, as they may be.
+// A block larger than the brick and not aligned with it. Values where nothing is covered are garbage, as they
+// may be.
 Block sampleBlock(const IndexBox& box, int channels, bool (*covered)(const Vec3i&)) {
     Block block;
     block.box = box;
@@ -54,8 +59,9 @@ TEST(BrickStore, ReturnsWhatWasPut) {
 
 TEST(BrickStore, TilesHaveTheOrderOfVdbLeafNodes) {
     BrickStore store(16, 1, 1);
-    store.put(0, {0, {0, 0, 0}}, sampleBlock({{0, 0, 0}, {16, 16, 16}}, 1, [](const Vec3i&) { return true; }));
-    const Tile* tile = store.tile(0, (1 * 2 + 0) * 2 + 1);   // x in [8, 16), y in [0, 8), z in [8, 16)
+    store.put(0, {0, {0, 0, 0}},
+              sampleBlock({{0, 0, 0}, {16, 16, 16}}, 1, [](const Vec3i&) { return true; }));
+    const Tile* tile = store.tile(0, (1 * 2 + 0) * 2 + 1);  // x in [8, 16), y in [0, 8), z in [8, 16)
     ASSERT_NE(tile, nullptr);
     for (int x = 0; x < 8; ++x)
         for (int y = 0; y < 8; ++y)
@@ -65,7 +71,8 @@ TEST(BrickStore, TilesHaveTheOrderOfVdbLeafNodes) {
 
 TEST(BrickStore, UncoveredValuesAreZeroAndEmptyTilesAbsent) {
     BrickStore store(16, 1, 1);
-    store.put(0, {0, {0, 0, 0}}, sampleBlock({{0, 0, 0}, {16, 16, 16}}, 1, [](const Vec3i& p) { return p.x == 3 && p.y == 9; }));
+    store.put(0, {0, {0, 0, 0}},
+              sampleBlock({{0, 0, 0}, {16, 16, 16}}, 1, [](const Vec3i& p) { return p.x == 3 && p.y == 9; }));
     int present = 0;
     for (int t = 0; t < store.tileCount(); ++t) {
         const Tile* tile = store.tile(0, t);

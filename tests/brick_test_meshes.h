@@ -17,12 +17,13 @@ inline TetMesh gridMesh(const Vec3i& n, const Vec3d& low, const Vec3d& high) {
         for (int j = 0; j <= n.y; ++j)
             for (int i = 0; i <= n.x; ++i)
                 mesh.points.push_back(glm::mix(low, high, Vec3d(i, j, k) / Vec3d(n)));
-    constexpr int kPaths[6][2] = {{1, 3}, {5, 1}, {3, 2}, {2, 6}, {4, 5}, {6, 4}};   // all of positive volume
+    constexpr int kPaths[6][2] = {{1, 3}, {5, 1}, {3, 2}, {2, 6}, {4, 5}, {6, 4}};  // all of positive volume
     for (int k = 0; k < n.z; ++k)
         for (int j = 0; j < n.y; ++j)
             for (int i = 0; i < n.x; ++i) {
                 const auto corner = [&](int c) { return at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2)); };
-                for (const auto& path : kPaths) mesh.tets.push_back({corner(0), corner(path[0]), corner(path[1]), corner(7)});
+                for (const auto& path : kPaths)
+                    mesh.tets.push_back({corner(0), corner(path[0]), corner(path[1]), corner(7)});
             }
     return mesh;
 }
@@ -45,14 +46,16 @@ inline TetMesh ballMesh(int n, double radius) {
     return mesh;
 }
 
-inline int addPointField(TetMesh& mesh, const std::string& name, const std::function<double(const Vec3d&)>& f) {
+inline int addPointField(TetMesh& mesh, const std::string& name,
+                         const std::function<double(const Vec3d&)>& f) {
     Field field{name, FieldLocation::point, 1, {}};
     for (const Vec3d& p : mesh.points) field.values.push_back(f(p));
     mesh.fields.push_back(std::move(field));
     return int(mesh.fields.size()) - 1;
 }
 
-inline int addCellField(TetMesh& mesh, const std::string& name, const std::function<double(std::int64_t)>& f) {
+inline int addCellField(TetMesh& mesh, const std::string& name,
+                        const std::function<double(std::int64_t)>& f) {
     Field field{name, FieldLocation::cell, 1, {}};
     for (std::int64_t e = 0; e < mesh.elementCount(); ++e) field.values.push_back(f(e));
     mesh.fields.push_back(std::move(field));

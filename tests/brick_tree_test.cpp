@@ -15,8 +15,10 @@ BrickTree twoLevels() {
 }
 
 TEST(BrickTree, LeavesAreOrderedByLevelThenZThenYThenX) {
-    const BrickTree tree({0, 0, 0}, 1, 8, {{1, {0, 0, 0}}, {0, {2, 1, 0}}, {0, {3, 0, 0}}, {0, {2, 0, 1}}, {0, {2, 0, 0}}});
-    const std::vector<BrickKey> expected{{0, {2, 0, 0}}, {0, {3, 0, 0}}, {0, {2, 1, 0}}, {0, {2, 0, 1}}, {1, {0, 0, 0}}};
+    const BrickTree tree({0, 0, 0}, 1, 8,
+                         {{1, {0, 0, 0}}, {0, {2, 1, 0}}, {0, {3, 0, 0}}, {0, {2, 0, 1}}, {0, {2, 0, 0}}});
+    const std::vector<BrickKey> expected{
+        {0, {2, 0, 0}}, {0, {3, 0, 0}}, {0, {2, 1, 0}}, {0, {2, 0, 1}}, {1, {0, 0, 0}}};
     EXPECT_TRUE(std::equal(expected.begin(), expected.end(), tree.leaves().begin(), tree.leaves().end()));
 }
 
@@ -33,7 +35,8 @@ TEST(BrickTree, LatticesOfAllLevelsShareTheOriginAndDoubleTheSpacing) {
 
 TEST(BrickTree, FindsLeavesByKeyByDescendantAndByPlace) {
     const BrickTree tree = twoLevels();
-    for (std::size_t i = 0; i < tree.leafCount(); ++i) EXPECT_EQ(tree.findLeaf(tree.leaves()[i]), std::int64_t(i));
+    for (std::size_t i = 0; i < tree.leafCount(); ++i)
+        EXPECT_EQ(tree.findLeaf(tree.leaves()[i]), std::int64_t(i));
     const std::int64_t coarse = tree.findLeaf({1, {0, 0, 0}});
     EXPECT_EQ(tree.findLeaf({0, {1, 1, 1}}), -1);
     EXPECT_EQ(tree.findCovering({0, {1, 1, 1}}), coarse);

@@ -10,8 +10,9 @@
 
 namespace tessera {
 
-/// The plainest resampler that can be right: every element is tried at every point of its bounding box, in double, with a small
-/// tolerance; the lowest element wins. For tests of what stands above the contract, on small meshes.
+/// The plainest resampler that can be right: every element is tried at every point of its bounding box, in
+/// double, with a small tolerance; the lowest element wins. For tests of what stands above the contract, on
+/// small meshes.
 class BruteForceResampler : public Resampler {
   public:
     std::string_view name() const override { return "brute-force"; }
@@ -26,10 +27,11 @@ class BruteForceResampler : public Resampler {
   private:
     class Bound : public BoundResampler {
       public:
-        Bound(const TetMesh& mesh, std::span<const int> fields) : mesh_(mesh), fields_(fields.begin(), fields.end()) {}
+        Bound(const TetMesh& mesh, std::span<const int> fields)
+            : mesh_(mesh), fields_(fields.begin(), fields.end()) {}
 
-        ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes, const BlockSink& sink,
-                                    const Execution& execution) override {
+        ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                    const BlockSink& sink, const Execution& execution) override {
             parallelFor(execution, std::int64_t(boxes.size()), [&](std::int64_t b) {
                 Block block;
                 block.lattice = lattice;
@@ -49,7 +51,9 @@ class BruteForceResampler : public Resampler {
             std::array<Vec3d, 4> v;
             Box3d bounds;
             for (std::size_t i = 0; i < 4; ++i) {
-                v[i] = (mesh_.points[std::size_t(mesh_.tets[std::size_t(element)][i])] - block.lattice.originWorld) / h;
+                v[i] = (mesh_.points[std::size_t(mesh_.tets[std::size_t(element)][i])] -
+                        block.lattice.originWorld) /
+                       h;
                 bounds.include(v[i]);
             }
             const double volume = glm::dot(glm::cross(v[1] - v[0], v[2] - v[0]), v[3] - v[0]);

@@ -238,6 +238,7 @@ std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::
     std::vector<int> calls(boxes.size(), 0);
     std::mutex mutex;
     const auto bound = resampler.bind(mesh, fields, sampling.target);
+    EXPECT_EQ(bound->target(), sampling.target.empty() ? resampler.targets().front() : sampling.target);
     bound->resample(lattice, boxes,
                     [&](std::size_t b, const Block& block) {
                         const std::lock_guard lock(mutex);

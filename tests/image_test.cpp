@@ -28,7 +28,8 @@ double lightness(const Rgb& colour) {
 }
 
 Rgb pixelAt(const RgbImage& image, int x, int y) {
-    const std::uint8_t* p = image.rgb.data() + (std::size_t(y) * std::size_t(image.width) + std::size_t(x)) * 3;
+    const std::uint8_t* p =
+        image.rgb.data() + (std::size_t(y) * std::size_t(image.width) + std::size_t(x)) * 3;
     return {p[0], p[1], p[2]};
 }
 
@@ -40,7 +41,8 @@ std::int64_t countColour(const RgbImage& image, const Rgb& colour) {
 }
 
 TEST(ColourMap, LightnessRisesEvenly) {
-    for (int i = 0; i <= 100; ++i) EXPECT_NEAR(lightness(mapColour(i / 100.0)), 15 + 75 * i / 100.0, 0.8) << i;
+    for (int i = 0; i <= 100; ++i)
+        EXPECT_NEAR(lightness(mapColour(i / 100.0)), 15 + 75 * i / 100.0, 0.8) << i;
 }
 
 TEST(ColourMap, ValuesOutsideTakeTheEnds) {
@@ -51,16 +53,19 @@ TEST(ColourMap, ValuesOutsideTakeTheEnds) {
 }
 
 TEST(BitmapFont, PrintableCharactersOfNumbersAndNamesDiffer) {
-    const std::string text = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz.,-+:/()[]=%_*<>|'\"#";
+    const std::string text =
+        "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz.,-+:/()[]=%_*<>|'\"#";
     const auto unknown = glyphRows(U'\u03c1');
     for (std::size_t i = 0; i < text.size(); ++i) {
         EXPECT_NE(glyphRows(char32_t(text[i])), unknown) << text[i];
-        for (std::size_t j = 0; j < i; ++j) EXPECT_NE(glyphRows(char32_t(text[i])), glyphRows(char32_t(text[j]))) << text[i] << text[j];
+        for (std::size_t j = 0; j < i; ++j)
+            EXPECT_NE(glyphRows(char32_t(text[i])), glyphRows(char32_t(text[j]))) << text[i] << text[j];
     }
 }
 
 TEST(BitmapFont, Utf8CountsCharacters) {
-    EXPECT_EQ(decodeUtf8("a\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80"), (std::vector<char32_t>{'a', 0xe4, 0x20ac, 0x1f600}));
+    EXPECT_EQ(decodeUtf8("a\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80"),
+              (std::vector<char32_t>{'a', 0xe4, 0x20ac, 0x1f600}));
     EXPECT_EQ(decodeUtf8("\xff\x80z\xc3").size(), 4u);
 }
 
@@ -84,12 +89,15 @@ TEST(Picture, PixelsCarryTheColoursOfTheirValues) {
     int left = -1, top = -1;
     for (int y = 0; y < picture.height && left < 0; ++y)
         for (int x = 0; x < picture.width && left < 0; ++x) {
-            if (pixelAt(picture, x, y) == mapColour(1) && x >= 19 * 7 && pixelAt(picture, x + 6, y) == mapColour(1)) left = x - 19 * 7, top = y;
+            if (pixelAt(picture, x, y) == mapColour(1) && x >= 19 * 7 &&
+                pixelAt(picture, x + 6, y) == mapColour(1))
+                left = x - 19 * 7, top = y;
         }
     ASSERT_GE(left, 0);
     for (int x = 2; x < 20; ++x)
         for (int y = 0; y < 10; ++y) {
-            EXPECT_EQ(pixelAt(picture, left + x * 7 + 3, top + y * 7 + 3), mapColour((x - 2) / 17.0)) << x << ' ' << y;
+            EXPECT_EQ(pixelAt(picture, left + x * 7 + 3, top + y * 7 + 3), mapColour((x - 2) / 17.0))
+                << x << ' ' << y;
         }
     for (int x = 0; x < 2; ++x) {
         const Rgb empty = pixelAt(picture, left + x * 7 + 3, top + 3);
@@ -140,14 +148,19 @@ TEST(Picture, PngReadsBackAndFailsCleanly) {
 // Two bricks of different levels in a box mesh with a linear field.
 struct SliceCase {
     TetMesh mesh;
-    BrickTree tree{{-1, 0, 0}, 0.125, 8, {{1, {0, 0, 0}}, {0, {2, 0, 0}}, {0, {2, 1, 0}}, {0, {2, 0, 1}}, {0, {2, 1, 1}}}};
+    BrickTree tree{{-1, 0, 0},
+                   0.125,
+                   8,
+                   {{1, {0, 0, 0}}, {0, {2, 0, 0}}, {0, {2, 1, 0}}, {0, {2, 0, 1}}, {0, {2, 1, 1}}}};
     BrickStore store{8, tree.leafCount(), 1};
     std::vector<int> fields{0};
     static double f(const Vec3d& p) { return 3 * p.x - 2 * p.y + p.z; }
     SliceCase() {
         for (int i = 0; i < 8; ++i)
-            mesh.points.push_back(glm::mix(Vec3d(-0.9, 0.1, 0.1), Vec3d(1.9, 1.8, 1.8), Vec3d(i & 1, i >> 1 & 1, i >> 2)));
-        for (const auto& [a, b] : {std::pair{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}}) mesh.tets.push_back({0, a, b, 7});
+            mesh.points.push_back(
+                glm::mix(Vec3d(-0.9, 0.1, 0.1), Vec3d(1.9, 1.8, 1.8), Vec3d(i & 1, i >> 1 & 1, i >> 2)));
+        for (const auto& [a, b] : {std::pair{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}})
+            mesh.tets.push_back({0, a, b, 7});
         Field field{"f", FieldLocation::point, 1, {}};
         for (const Vec3d& p : mesh.points) field.values.push_back(f(p));
         mesh.fields.push_back(field);
@@ -157,7 +170,8 @@ struct SliceCase {
         const BrickKey& key = tree.leaves()[leaf];
         Tile& tile = store.ensureTile(leaf, 0);
         for (int i = 0; i < kTilePoints; ++i) {
-            const Vec3d p = tree.lattice(key.level).worldFromIndex(Vec3d(tree.ownedPoints(key).min + Vec3i(i >> 6, i >> 3 & 7, i & 7)));
+            const Vec3d p = tree.lattice(key.level).worldFromIndex(
+                Vec3d(tree.ownedPoints(key).min + Vec3i(i >> 6, i >> 3 & 7, i & 7)));
             const bool in = p.x >= -0.9 && p.x <= 1.9 && p.y >= 0.1 && p.y <= 1.8 && p.z >= 0.1 && p.z <= 1.8;
             if (!in) continue;
             tile.coverage[std::size_t(i >> 6)] |= std::uint64_t(1) << (i & 63);
@@ -187,7 +201,7 @@ TEST(Slice, ShowsTheFieldWithItsFirstAxisToTheRightAndTheSecondUp) {
                 Vec3d p(0.7);
                 p[right] = options.boundsWorld.min[right] + (x + 0.5) * pixel;
                 p[up] = (image.height - 1 - y + 0.5) * pixel;
-                if (p.x > 1) continue;   // no bricks there
+                if (p.x > 1) continue;  // no bricks there
                 const bool deep = p.x > -0.6 && p.x < 0.9 && p.y > 0.4 && p.y < 1.5 && p.z > 0.4 && p.z < 1.5;
                 if (!deep) continue;
                 ASSERT_TRUE(image.coverage[image.offset(x, y)]) << x << ' ' << y;

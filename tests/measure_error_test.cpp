@@ -23,11 +23,12 @@ Measured measure(const TetMesh& mesh, std::vector<int> fields, const RefineOptio
     ResampleStatistics statistics;
     int channels = 0;
     for (const int f : fields) channels += mesh.fields[std::size_t(f)].components;
-    const BrickStore store =
-        resampleTree(result.tree, *BruteForceResampler().bind(mesh, fields, {}), channels, execution, statistics);
+    const BrickStore store = resampleTree(result.tree, *BruteForceResampler().bind(mesh, fields, {}),
+                                          channels, execution, statistics);
     MeasureOptions measureOptions;
     measureOptions.leafErrors = leafErrors;
-    result.report = measureError(mesh, fields, result.tree, store, NearestPointIndex(mesh), execution, measureOptions);
+    result.report =
+        measureError(mesh, fields, result.tree, store, NearestPointIndex(mesh), execution, measureOptions);
     return result;
 }
 
@@ -84,7 +85,8 @@ TEST(MeasureError, AHatBetweenLatticePointsIsMissedByItsHeight) {
 }
 
 TEST(MeasureError, AQuadraticFieldHasItsClosedForm) {
-    // Nodes on a lattice twice as fine as the samples: f = x^2 at an odd node is missed by (a^2 + (a + 2)^2) / 2 - (a + 1)^2 = 1.
+    // Nodes on a lattice twice as fine as the samples: f = x^2 at an odd node is missed by (a^2 + (a + 2)^2)
+    // / 2 - (a + 1)^2 = 1.
     TetMesh mesh = gridMesh({8, 8, 8}, Vec3d(0), Vec3d(8));
     addPointField(mesh, "square", [](const Vec3d& p) { return p.x * p.x; });
     RefineOptions options = uniform(0);
@@ -97,14 +99,15 @@ TEST(MeasureError, AQuadraticFieldHasItsClosedForm) {
 }
 
 TEST(MeasureError, CornersOutsideTakeTheNearestMeshPoint) {
-    // The lattice is not aligned with the mesh: outermost cells stick out, and the field is constant along their way out.
+    // The lattice is not aligned with the mesh: outermost cells stick out, and the field is constant along
+    // their way out.
     TetMesh mesh = gridMesh({4, 4, 4}, Vec3d(0), Vec3d(1));
     addPointField(mesh, "constant", [](const Vec3d&) { return 2.5; });
     RefineOptions options = uniform(0);
     options.spacingWorld = 0.23;
     options.frame = FixedFrame{Vec3d(-0.1), 0.23};
     const ErrorReport report = measure(mesh, {0}, options).report;
-    EXPECT_EQ(report.fields[0].max, 0.0);
+    EXPECT_LT(report.fields[0].max, 1e-14) << "weights add up to 1 but for rounding";
     EXPECT_EQ(report.fields[0].range, 0.0);
     EXPECT_EQ(report.fields[0].relativeMax, 0.0);
     EXPECT_LT(report.fullyCoveredShare, 1.0);
@@ -113,7 +116,8 @@ TEST(MeasureError, CornersOutsideTakeTheNearestMeshPoint) {
 
 TEST(MeasureError, CellFieldsAreMeasuredAtCentroidsAndVectorsByTheirNorm) {
     TetMesh mesh = gridMesh({4, 4, 4}, Vec3d(0), Vec3d(1));
-    const int cell = addCellField(mesh, "layer", [&](std::int64_t e) { return e < 192 ? 0.0 : 1.0; });   // z = 1/2
+    const int cell =
+        addCellField(mesh, "layer", [&](std::int64_t e) { return e < 192 ? 0.0 : 1.0; });  // z = 1/2
     Field vector{"vector", FieldLocation::point, 3, {}};
     for (const Vec3d& p : mesh.points)
         for (const double v : {3 * p.x, 4 * p.x, 0.0}) vector.values.push_back(v);
@@ -147,7 +151,7 @@ TEST(MeasureError, ValuesThatAreNotFiniteAreSkippedAndCounted) {
 TEST(MeasureError, CountsFlatAndInvertedElements) {
     TetMesh mesh = gridMesh({4, 4, 4}, Vec3d(0), Vec3d(1));
     std::swap(mesh.tets[7][0], mesh.tets[7][1]);
-    mesh.tets.push_back({0, 1, 2, 3});           // in one row
+    mesh.tets.push_back({0, 1, 2, 3});  // in one row
     mesh.points.push_back({5, 5, 5});
     mesh.tets.push_back({0, 1, 2, std::int32_t(mesh.points.size()) - 1});
     mesh.tets.back()[3] = mesh.tets.back()[0];
@@ -161,18 +165,22 @@ TEST(MeasureError, CountsFlatAndInvertedElements) {
 
 TEST(MeasureError, LeafErrorsAreTheLargestOfTheirLeaf) {
     TetMesh mesh = gridMesh({9, 9, 9}, Vec3d(0), Vec3d(1));
-    addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
+    addPointField(mesh, "wave",
+                  [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
     std::vector<double> leafErrors;
     const Measured measured = measure(mesh, {0}, uniform(30), 0, &leafErrors);
     ASSERT_EQ(leafErrors.size(), measured.tree.leafCount());
     EXPECT_EQ(*std::max_element(leafErrors.begin(), leafErrors.end()), measured.report.fields[0].relativeMax);
-    const Vec3d worst = (measured.report.fields[0].worstPlaceWorld - measured.tree.originWorld()) / measured.tree.spacingWorld();
-    EXPECT_EQ(leafErrors[std::size_t(measured.tree.findLeafAt(worst))], measured.report.fields[0].relativeMax);
+    const Vec3d worst = (measured.report.fields[0].worstPlaceWorld - measured.tree.originWorld()) /
+                        measured.tree.spacingWorld();
+    EXPECT_EQ(leafErrors[std::size_t(measured.tree.findLeafAt(worst))],
+              measured.report.fields[0].relativeMax);
 }
 
 TEST(MeasureError, ReportsAreTheSameForAnyNumberOfThreads) {
     TetMesh mesh = gradedMesh(10, 3.0);
-    addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
+    addPointField(mesh, "wave",
+                  [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
     const FieldError one = measure(mesh, {0}, threeLevels(), 1).report.fields[0];
     for (const int threads : {2, 5, 16}) {
         const FieldError many = measure(mesh, {0}, threeLevels(), threads).report.fields[0];

@@ -106,7 +106,9 @@ TEST_P(SharedData, HasTheVolumeOfItsSource) {
     const MeshFile file = read(path);
     EXPECT_EQ(file.statistics.cells, GetParam().cells);
     EXPECT_NEAR(sumOfVolumes(file.mesh), GetParam().volume, GetParam().tolerance * GetParam().volume);
-    if (GetParam().inverted >= 0) EXPECT_EQ(file.statistics.inverted, GetParam().inverted);
+    if (GetParam().inverted >= 0) {
+        EXPECT_EQ(file.statistics.inverted, GetParam().inverted);
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -131,8 +133,8 @@ INSTANTIATE_TEST_SUITE_P(
                     SharedMesh{"vtk-small/tetra.vtu", 1, 0.133333335, 1e-7, 0},
                     SharedMesh{"vtk-small/tetraMesh.vtk", 160, 2359.722, 1e-6, 80},
                     SharedMesh{"vtk-small/uGridEx.vtk", 4, 2.33333333, 1e-7, 0}),
-    [](const auto& info) {
-        std::string name = std::filesystem::path(info.param.path).filename().string();
+    [](const auto& parameter) {
+        std::string name = std::filesystem::path(parameter.param.path).filename().string();
         for (char& c : name)
             if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
         return name;

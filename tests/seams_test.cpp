@@ -21,15 +21,17 @@ struct Sampled {
     BrickStore store;
 };
 
-Sampled sampledByElementSize(TetMesh mesh, int maxLevels, int resolution) {
+Sampled sampledByElementSize(TetMesh mesh, int maxLevels, int resolution, double samplesPerElement = 2) {
     Sampled result;
     result.mesh = std::move(mesh);
-    addPointField(result.mesh, "wave", [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
+    addPointField(result.mesh, "wave",
+                  [](const Vec3d& p) { return std::sin(9 * p.x) * std::cos(7 * p.y) + p.z * p.z; });
     result.fields = {0};
     RefineOptions options;
     options.brickCells = 8;
     options.maxLevels = maxLevels;
     options.resolution = resolution;
+    options.samplesPerElement = samplesPerElement;
     result.tree = planBricks(result.mesh, options, {});
     ResampleStatistics statistics;
     const auto bound = BruteForceResampler().bind(result.mesh, result.fields, {});
@@ -40,9 +42,12 @@ Sampled sampledByElementSize(TetMesh mesh, int maxLevels, int resolution) {
 Vec3d firstOf(const BrickTree& tree, const BrickKey& key) {
     return Vec3d(key.index) * std::ldexp(double(tree.brickCells()), key.level);
 }
-double sizeOf(const BrickTree& tree, const BrickKey& key) { return std::ldexp(double(tree.brickCells()), key.level); }
+double sizeOf(const BrickTree& tree, const BrickKey& key) {
+    return std::ldexp(double(tree.brickCells()), key.level);
+}
 
-// Random places that closed boxes of two or more leaves share, in index space of level 0: on faces, on edges and at corners.
+// Random places that closed boxes of two or more leaves share, in index space of level 0: on faces, on edges
+// and at corners.
 std::vector<Vec3d> sharedPlaces(const BrickTree& tree, int perLeaf) {
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> unit(0, 1);
@@ -50,7 +55,7 @@ std::vector<Vec3d> sharedPlaces(const BrickTree& tree, int perLeaf) {
     for (const BrickKey& key : tree.leaves())
         for (int i = 0; i < perLeaf; ++i) {
             Vec3d t(unit(random), unit(random), unit(random));
-            const int fixed = 1 + int(random() % 3);   // how many coordinates lie on the brick's border
+            const int fixed = 1 + int(random() % 3);  // how many coordinates lie on the brick's border
             const int first = int(random() % 3);
             for (int a = 0; a < fixed; ++a) t[(first + a) % 3] = double(random() % 2);
             places.push_back(firstOf(tree, key) + t * sizeOf(tree, key));
@@ -61,7 +66,7 @@ std::vector<Vec3d> sharedPlaces(const BrickTree& tree, int perLeaf) {
 void expectContinuous(const Sampled& sampled, int perLeaf) {
     const NearestPointIndex nearest(sampled.mesh);
     const Reconstruction reconstruction(sampled.mesh, sampled.fields, sampled.tree, sampled.store, nearest);
-    std::map<int, int> comparedAcross;   // levels apart -> pairs
+    std::map<int, int> comparedAcross;  // levels apart -> pairs
     for (const Vec3d& place : sharedPlaces(sampled.tree, perLeaf)) {
         // Every leaf whose closed box holds the place, found from the 8 directions around it.
         std::set<std::int64_t> leaves;
@@ -99,28 +104,30 @@ TEST(Seams, ReconstructionIsContinuousAtTheMeshBoundaryToo) {
     TetMesh ball = ballMesh(8, 0.9);
     for (Vec3d& p : ball.points) p += Vec3d(0.2, 0.1, 0) * glm::dot(p, p);
     // Elements shrink towards one side, so levels change along the boundary.
-    for (Vec3d& p : ball.points) p = Vec3d(std::exp(1.5 * p.x), p.y * std::exp(1.5 * p.x), p.z * std::exp(1.5 * p.x));
-    const Sampled sampled = sampledByElementSize(std::move(ball), 4, 200);
+    for (Vec3d& p : ball.points)
+        p = Vec3d(std::exp(2 * p.x), p.y * std::exp(2 * p.x), p.z * std::exp(2 * p.x));
+    const Sampled sampled = sampledByElementSize(std::move(ball), 4, 257, 4);
     ASSERT_GE(sampled.tree.levelCount(), 3);
     expectContinuous(sampled, 40);
 }
 
 TEST(Seams, BorderPointsTakeTheCoarseBricksInterpolation) {
-    const Sampled sampled = sampledByElementSize(gradedMesh(8, 3.0), 3, 129);
+    const Sampled sampled = sampledByElementSize(gradedMesh(8, 3.0), 4, 257, 3);
     const NearestPointIndex nearest(sampled.mesh);
     const Reconstruction reconstruction(sampled.mesh, sampled.fields, sampled.tree, sampled.store, nearest);
     int checked = 0;
     for (const BrickKey& key : sampled.tree.leaves()) {
         const std::int64_t coarse = sampled.tree.findCovering({key.level, key.index + Vec3i(1, 0, 0)});
         if (coarse < 0 || sampled.tree.leaves()[std::size_t(coarse)].level != key.level + 1) continue;
-        const Vec3i onFace = key.index * 8 + Vec3i(8, 3, 3);   // between coarse lattice points in y and z
+        const Vec3i onFace = key.index * 8 + Vec3i(8, 3, 3);  // between coarse lattice points in y and z
         double expected = 0;
         for (int y = 0; y < 2; ++y)
             for (int z = 0; z < 2; ++z) {
                 const Vec3i corner((key.index.x + 1) * 4, key.index.y * 4 + 1 + y, key.index.z * 4 + 1 + z);
                 bool covered = false;
                 const BrickKey& coarseKey = sampled.tree.leaves()[std::size_t(coarse)];
-                expected += 0.25 * double(sampled.store.value(std::size_t(coarse), corner - coarseKey.index * 8, 0, covered));
+                expected += 0.25 * double(sampled.store.value(std::size_t(coarse),
+                                                              corner - coarseKey.index * 8, 0, covered));
                 EXPECT_TRUE(covered);
             }
         const SeamValue got = reconstruction.at(key.level, onFace, 0);

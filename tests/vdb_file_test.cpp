@@ -57,7 +57,8 @@ std::vector<BrickKey> nestedLeaves() {
     BrickKey refined{3, {0, -1, -1}};
     while (refined.level > 0) {
         for (int child = 0; child < 8; ++child) {
-            const BrickKey key{refined.level - 1, refined.index * 2 + Vec3i(child & 1, child >> 1 & 1, child >> 2)};
+            const BrickKey key{refined.level - 1,
+                               refined.index * 2 + Vec3i(child & 1, child >> 1 & 1, child >> 2)};
             if (child == 0 && key.level > 0) continue;
             leaves.push_back(key);
         }
@@ -75,12 +76,15 @@ std::uint32_t scramble(std::uint32_t x) {
 }
 
 std::uint32_t pointKey(int level, const Vec3i& p, int channel) {
-    return scramble(scramble(scramble(scramble(std::uint32_t(p.x)) + std::uint32_t(p.y)) + std::uint32_t(p.z)) +
-                    std::uint32_t(level * 16 + channel));
+    return scramble(
+        scramble(scramble(scramble(std::uint32_t(p.x)) + std::uint32_t(p.y)) + std::uint32_t(p.z)) +
+        std::uint32_t(level * 16 + channel));
 }
 
 // Three of four points are covered; values of all magnitudes and signs.
-bool coveredAt(int level, const Vec3i& p) { return pointKey(level, p, 15) % 4 != 0; }
+bool coveredAt(int level, const Vec3i& p) {
+    return pointKey(level, p, 15) % 4 != 0;
+}
 float valueAt(int level, const Vec3i& p, int channel) {
     const std::uint32_t key = pointKey(level, p, channel);
     return (key & 1 ? -1.0f : 1.0f) * std::ldexp(1.0f + float(key >> 9) * 0x1p-23f, int(key >> 1 & 31) - 16);
@@ -106,15 +110,16 @@ BrickStore fillStore(const BrickTree& tree, int channels, ValueFunction value, C
                     if (!covered(key.level, p)) continue;
                     block.coverage[block.offset(p)] = 1;
                     for (int c = 0; c < channels; ++c)
-                        block.values[std::size_t(c) * block.count() + block.offset(p)] = value(key.level, p, c);
+                        block.values[std::size_t(c) * block.count() + block.offset(p)] =
+                            value(key.level, p, c);
                 }
         store.put(leaf, key, block);
     }
     return store;
 }
 
-BrickResult makeResult(const Vec3d& origin, double spacing, int brickCells, std::vector<BrickKey> leaves, int channels,
-                       ValueFunction value = valueAt, CoverFunction covered = coveredAt) {
+BrickResult makeResult(const Vec3d& origin, double spacing, int brickCells, std::vector<BrickKey> leaves,
+                       int channels, ValueFunction value = valueAt, CoverFunction covered = coveredAt) {
     BrickResult result;
     result.tree = BrickTree(origin, spacing, brickCells, std::move(leaves));
     result.store = fillStore(result.tree, channels, value, covered);
@@ -123,11 +128,13 @@ BrickResult makeResult(const Vec3d& origin, double spacing, int brickCells, std:
 
 const std::vector<OutputField> kScalar{{"f", "f", "point", 1, 0}};
 // A scalar, a vector and a tensor: ten channels.
-const std::vector<OutputField> kMixed{{"T", "Temp", "point", 1, 0}, {"U", "velocity", "point", 3, 1}, {"S", "stress", "cell", 6, 4}};
+const std::vector<OutputField> kMixed{
+    {"T", "Temp", "point", 1, 0}, {"U", "velocity", "point", 3, 1}, {"S", "stress", "cell", 6, 4}};
 
 // Bitwise, but any NaN equals any other.
 bool sameFloat(float a, float b) {
-    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b) || (std::isnan(a) && std::isnan(b));
+    return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b) ||
+           (std::isnan(a) && std::isnan(b));
 }
 
 void expectSameTree(const BrickTree& a, const BrickTree& b) {
@@ -154,7 +161,8 @@ void expectStored(const VdbFile& read, int channels, ValueFunction value, CoverF
                         const float stored = read.store.value(leaf, p - box.min, c, isCovered);
                         const bool expected = covered(key.level, p);
                         ++points;
-                        wrong += isCovered != expected || (expected && !sameFloat(stored, value(key.level, p, c)));
+                        wrong +=
+                            isCovered != expected || (expected && !sameFloat(stored, value(key.level, p, c)));
                     }
     }
     EXPECT_GT(points, 0);
@@ -214,7 +222,8 @@ TEST_F(VdbFileTest, LevelsRoundTripIsBitExact) {
         options.algorithm = "software";
         options.criterion = "error 1%";
         options.sourceFile = "mesh \xc3\xa4.vtu";
-        const VdbWriteResult written = writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
+        const VdbWriteResult written =
+            writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
         EXPECT_TRUE(written.notes.empty());
         EXPECT_EQ(written.fileBytes, std::int64_t(fs::file_size(file("out.vdb"))));
         EXPECT_EQ(result.store.coveredPoints(), 0) << "tiles are freed on the way";
@@ -290,15 +299,19 @@ TEST_F(VdbFileTest, VoxelIsFieldAtItsLatticePoint) {
         for (const BrickKey& key : tree.leaves()) {
             if (key.level != level) continue;
             const IndexBox box = tree.ownedPoints(key);
-            for (int i = 0; i < 512; ++i) expected += coveredAt(level, box.min + Vec3i(i >> 6, i >> 3 & 7, i & 7));
+            for (int i = 0; i < 512; ++i)
+                expected += coveredAt(level, box.min + Vec3i(i >> 6, i >> 3 & 7, i & 7));
         }
         EXPECT_EQ(voxels, expected);
-        EXPECT_EQ(findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage_level_" + std::to_string(level))->activeVoxelCount(),
+        EXPECT_EQ(findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage_level_" + std::to_string(level))
+                      ->activeVoxelCount(),
                   std::uint64_t(expected));
     }
 }
 
-bool everywhere(int, const Vec3i&) { return true; }
+bool everywhere(int, const Vec3i&) {
+    return true;
+}
 // One vector component is infinite at x = 3, all scalars NaN at x = 5.
 float holed(int level, const Vec3i& p, int channel) {
     if (p.x == 3 && channel == 2) return kInfinity;
@@ -338,7 +351,8 @@ TEST_F(VdbFileTest, ExtensionIsActiveButNotCovered) {
     const auto fine = findGrid<openvdb::FloatGrid>(file("out.vdb"), "T_level_0");
     const auto tensor = findGrid<openvdb::FloatGrid>(file("out.vdb"), "S_3_level_0");
     const auto vector = findGrid<openvdb::Vec3SGrid>(file("out.vdb"), "U_level_3");
-    const openvdb::Coord inside(uncovered.x, uncovered.y, uncovered.z), outside(100, 200, -300), coarse(-40, 0, 0);
+    const openvdb::Coord inside(uncovered.x, uncovered.y, uncovered.z), outside(100, 200, -300),
+        coarse(-40, 0, 0);
     EXPECT_TRUE(fine->tree().isValueOn(inside));
     EXPECT_EQ(fine->tree().getValue(inside), 0.5f);
     EXPECT_TRUE(fine->tree().isValueOn(outside));
@@ -409,7 +423,8 @@ TEST_F(VdbFileTest, VoxelsFromSmallToLargeCanBeWritten) {
             BrickResult result = makeResult({0, 0, 0}, spacing, 8, {{0, {0, 0, 0}}}, 1);
             VdbWriteOptions options;
             options.upAxis = axis;
-            const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
+            const VdbWriteResult written =
+                writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
             const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f_level_0");
             EXPECT_NEAR(grid->voxelSize().x() / (spacing * written.unitScale), 1, 1e-12);
             EXPECT_GE(grid->voxelSize().x(), 1.9e-5);
@@ -425,7 +440,9 @@ TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
         VdbWriteOptions options;
         options.upAxis = axis;
         writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
-        const auto turn = [&](const Vec3d& v) { return axis == UpAxis::y ? Vec3d(v.x, v.z, -v.y) : Vec3d(v.x, -v.z, v.y); };
+        const auto turn = [&](const Vec3d& v) {
+            return axis == UpAxis::y ? Vec3d(v.x, v.z, -v.y) : Vec3d(v.x, -v.z, v.y);
+        };
         const auto grid = findGrid<openvdb::Vec3SGrid>(file("out.vdb"), "U_level_1");
         std::int64_t voxels = 0;
         for (auto it = grid->cbeginValueOn(); it; ++it, ++voxels) {
@@ -446,14 +463,19 @@ TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
     }
 }
 
-float smallIntegers(int level, const Vec3i& p, int channel) { return float(int(pointKey(level, p, channel) % 2001) - 1000); }
-float pressures(int, const Vec3i& p, int) { return 101325.0f + float(p.x); }
+float smallIntegers(int level, const Vec3i& p, int channel) {
+    return float(int(pointKey(level, p, channel) % 2001) - 1000);
+}
+float pressures(int, const Vec3i& p, int) {
+    return 101325.0f + float(p.x);
+}
 
 TEST_F(VdbFileTest, HalfFloatsReadBack) {
     // Integers to 2048 are exact in half floats.
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, smallIntegers, coveredAt);
     VdbWriteOptions options;
-    const std::int64_t full = writeVdb(file("full.vdb"), kMixed, result, nullptr, nullptr, options, {}).fileBytes;
+    const std::int64_t full =
+        writeVdb(file("full.vdb"), kMixed, result, nullptr, nullptr, options, {}).fileBytes;
     result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, smallIntegers, coveredAt);
     options.halfFloat = true;
     const VdbWriteResult half = writeVdb(file("half.vdb"), kMixed, result, nullptr, nullptr, options, {});
@@ -478,9 +500,11 @@ TEST_F(VdbFileTest, ValuesBeyondHalfFloatsStayFull) {
 // A box of six tets with a field that trilinear interpolation reproduces.
 TetMesh linearMesh(const Box3d& box) {
     TetMesh mesh;
-    for (int i = 0; i < 8; ++i) mesh.points.push_back(glm::mix(box.min, box.max, Vec3d(i & 1, i >> 1 & 1, i >> 2)));
+    for (int i = 0; i < 8; ++i)
+        mesh.points.push_back(glm::mix(box.min, box.max, Vec3d(i & 1, i >> 1 & 1, i >> 2)));
     // The six paths along edges from corner 0 to corner 7.
-    for (const auto& [a, b] : {std::pair{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}}) mesh.tets.push_back({0, a, b, 7});
+    for (const auto& [a, b] : {std::pair{1, 3}, {3, 2}, {2, 6}, {6, 4}, {4, 5}, {5, 1}})
+        mesh.tets.push_back({0, a, b, 7});
     Field field{"f", FieldLocation::point, 1, {}};
     for (const Vec3d& p : mesh.points) field.values.push_back(1 + 2 * p.x - 3 * p.y + 0.5 * p.z);
     mesh.fields.push_back(field);
@@ -491,17 +515,24 @@ float linear(int level, const Vec3i& p, int) {
     const Vec3d place = Vec3d(p) * std::ldexp(kSpacing, level);
     return float(1 + 2 * place.x - 3 * place.y + 0.5 * place.z);
 }
-// Meshes inside the nested bricks, in index space of level 0: nearly all of it, and a slab that cuts through bricks of all levels.
+// Meshes inside the nested bricks, in index space of level 0: nearly all of it, and a slab that cuts through
+// bricks of all levels.
 const Box3d kWide{{-62.5, -62.5, -62.5}, {62.5, -1.5, -1.5}};
 const Box3d kSlab{{-10.5, -62.5, -62.5}, {10.5, -1.5, -1.5}};
 bool inside(const Box3d& box, int level, const Vec3i& p) {
     const Vec3d q = Vec3d(p) * std::ldexp(1.0, level);
     return glm::all(glm::lessThanEqual(box.min, q)) && glm::all(glm::lessThanEqual(q, box.max));
 }
-bool wide(int level, const Vec3i& p) { return inside(kWide, level, p); }
-bool slab(int level, const Vec3i& p) { return inside(kSlab, level, p); }
+bool wide(int level, const Vec3i& p) {
+    return inside(kWide, level, p);
+}
+bool slab(int level, const Vec3i& p) {
+    return inside(kSlab, level, p);
+}
 // Deeper than any voxel is wide, so that all corners around are covered.
-bool deepInWide(const Vec3i& p) { return inside({kWide.min + 8.0, kWide.max - 8.0}, 0, p); }
+bool deepInWide(const Vec3i& p) {
+    return inside({kWide.min + 8.0, kWide.max - 8.0}, 0, p);
+}
 
 struct FlatCase {
     std::vector<int> fields{0};
@@ -521,7 +552,8 @@ TEST_F(VdbFileTest, FlatLayoutReconstructsCoarseBricks) {
     VdbWriteOptions options;
     options.layout = VdbLayout::flat;
     const BrickTree tree = flat.result.tree;
-    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
+    const VdbWriteResult written =
+        writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
     EXPECT_EQ(written.flatLevel, 0);
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
     const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
@@ -580,7 +612,8 @@ TEST_F(VdbFileTest, FlatExtensionFillsCutCellsOfCoarseBricks) {
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
     const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
     EXPECT_GT(grid->activeVoxelCount(), coverage->activeVoxelCount());
-    // A brick of level 3 has points at x = -16 (outside) and -8 (inside): all fine points between them carry a value.
+    // A brick of level 3 has points at x = -16 (outside) and -8 (inside): all fine points between them carry
+    // a value.
     for (int x = -15; x <= -8; ++x) {
         EXPECT_TRUE(grid->tree().isValueOn(openvdb::Coord(x, -40, -40))) << x;
         EXPECT_EQ(coverage->tree().isValueOn(openvdb::Coord(x, -40, -40)), x == -8) << x;
@@ -592,7 +625,8 @@ TEST_F(VdbFileTest, FlatSizeCanBeCapped) {
     VdbWriteOptions options;
     options.layout = VdbLayout::flat;
     options.maxFlatVoxels = 2 * 32 * 32 * 32;
-    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
+    const VdbWriteResult written =
+        writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
     EXPECT_EQ(written.flatLevel, 1);
     ASSERT_EQ(written.notes.size(), 1u);
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
@@ -610,7 +644,8 @@ TEST_F(VdbFileTest, FlatSizeCanBeCapped) {
     EXPECT_EQ(deep, 55 * 23 * 23);
     // The part that was refined to level 0 has every second of its points.
     for (int x = 0; x < 4; ++x)
-        for (int y = -31; y < -28; ++y) ASSERT_TRUE(grid->tree().isValueOn(openvdb::Coord(x, y, -30))) << x << ' ' << y;
+        for (int y = -31; y < -28; ++y)
+            ASSERT_TRUE(grid->tree().isValueOn(openvdb::Coord(x, y, -30))) << x << ' ' << y;
 }
 
 TEST_F(VdbFileTest, SameBytesForAnyNumberOfThreads) {
@@ -618,8 +653,8 @@ TEST_F(VdbFileTest, SameBytesForAnyNumberOfThreads) {
         std::string first;
         for (int threads : {1, 2, 5, 16}) {
             FlatCase flat(kSlab, slab);
-            const ExtensionPoints extension =
-                extendOutside(flat.mesh, flat.fields, flat.result.tree, flat.result.store, flat.nearest, 1, {});
+            const ExtensionPoints extension = extendOutside(flat.mesh, flat.fields, flat.result.tree,
+                                                            flat.result.store, flat.nearest, 1, {});
             VdbWriteOptions options;
             options.layout = layout;
             Execution execution;
@@ -720,7 +755,8 @@ TEST_F(VdbFileTest, DamagedFilesAreRefused) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
     writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
     const std::string good = readBytes(file("out.vdb"));
-    for (std::size_t length : {std::size_t(0), std::size_t(5), std::size_t(21), std::size_t(56), std::size_t(57), std::size_t(1000), good.size() - 1}) {
+    for (std::size_t length : {std::size_t(0), std::size_t(5), std::size_t(21), std::size_t(56),
+                               std::size_t(57), std::size_t(1000), good.size() - 1}) {
         writeBytes(file("cut.vdb"), good.substr(0, length));
         EXPECT_THROW(readVdb(file("cut.vdb")), InputError) << length;
         EXPECT_THROW(readVdbLattice(file("cut.vdb")), InputError) << length;
@@ -758,11 +794,13 @@ TEST_F(VdbFileTest, FilesOfOtherProgramsGiveTheirLattice) {
     openvdb::io::File(file("empty.vdb")).write(openvdb::GridPtrVec{});
     EXPECT_THROW(readVdbLattice(file("empty.vdb")), InputError);
 
-    // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never in a crash.
+    // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never
+    // in a crash.
     const std::string good = readBytes(file("other.vdb"));
     for (std::uint32_t i = 0; i < 60; ++i) {
         std::string bad = good;
-        for (std::uint32_t k = 0; k < 3; ++k) bad[57 + scramble(i * 3 + k) % 400] = char(scramble(i + k) & 255);
+        for (std::uint32_t k = 0; k < 3; ++k)
+            bad[57 + scramble(i * 3 + k) % 400] = char(scramble(i + k) & 255);
         writeBytes(file("bad.vdb"), bad);
         try {
             readVdbLattice(file("bad.vdb"));
@@ -791,7 +829,8 @@ TEST_F(VdbFileTest, EmptyTreeGivesAFileWithoutVoxels) {
 }
 
 TEST_F(VdbFileTest, VdbPrintListsTheGrids) {
-    if (std::system("command -v vdb_print > /dev/null 2>&1") != 0) GTEST_SKIP() << "vdb_print isn't installed";
+    if (std::system("command -v vdb_print > /dev/null 2>&1") != 0)
+        GTEST_SKIP() << "vdb_print isn't installed";
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10);
     writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
     ASSERT_EQ(std::system(("vdb_print -l " + file("out.vdb") + " > " + file("list.txt")).c_str()), 0);

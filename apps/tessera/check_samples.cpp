@@ -13,18 +13,19 @@ namespace tessera {
 
 namespace {
 
-// Double rounding in barycentric coordinates of badly shaped elements stays far below these, so a verdict is never a rounding's fault.
-constexpr double kSurelyInsideShare = 1e-6;    // barycentric coordinate
-constexpr double kSurelyInsideVoxels = 1e-6;   // distance to each side
+// Double rounding in barycentric coordinates of badly shaped elements stays far below these, so a verdict is
+// never a rounding's fault.
+constexpr double kSurelyInsideShare = 1e-6;   // barycentric coordinate
+constexpr double kSurelyInsideVoxels = 1e-6;  // distance to each side
 constexpr double kFloatUlp = 1.0 / (1 << 23);
 constexpr double kHalfUlp = 1.0 / (1 << 10);
 constexpr double kSmallestHalf = 6e-8;
 
 /// Where a point lies in one element.
 struct Place {
-    std::array<double, 4> weights{};    ///< barycentric
-    std::array<Vec3d, 4> gradients{};   ///< of the weights, world units
-    double depth = 0;                   ///< least signed distance to a side, positive inside, world units
+    std::array<double, 4> weights{};   ///< barycentric
+    std::array<Vec3d, 4> gradients{};  ///< of the weights, world units
+    double depth = 0;                  ///< least signed distance to a side, positive inside, world units
 };
 
 /// False for an element of no volume in double.
@@ -46,8 +47,8 @@ bool locate(const TetMesh& mesh, std::int32_t element, const Vec3d& pointWorld, 
 }
 
 /// How far a stored value is from what this element allows; at most 0 when it is explained.
-double excess(const TetMesh& mesh, const Field& field, int component, std::int32_t element, const Place& place, double stored,
-              double placeErrorWorld, bool halfFloat) {
+double excess(const TetMesh& mesh, const Field& field, int component, std::int32_t element,
+              const Place& place, double stored, double placeErrorWorld, bool halfFloat) {
     double exact = 0, largest = 0;
     Vec3d gradient(0);
     if (field.location == FieldLocation::cell) {
@@ -64,7 +65,7 @@ double excess(const TetMesh& mesh, const Field& field, int component, std::int32
             largest = std::max(largest, std::abs(value));
         }
     }
-    if (!std::isfinite(exact)) return 0;   // not valid there: nothing is claimed
+    if (!std::isfinite(exact)) return 0;  // not valid there: nothing is claimed
     double allowed = 4 * kFloatUlp * largest + double(std::numeric_limits<float>::min()) +
                      glm::length(gradient) * (placeErrorWorld + 2 * std::max(0.0, -place.depth));
     if (halfFloat) allowed += kHalfUlp * largest + kSmallestHalf;
@@ -73,8 +74,14 @@ double excess(const TetMesh& mesh, const Field& field, int component, std::int32
 
 class Checker {
   public:
-    Checker(const TetMesh& mesh, std::span<const int> fields, const VdbFile& file, const Resampler& resampler, bool halfFloat)
-        : mesh_(mesh), fields_(fields), file_(file), resampler_(resampler), halfFloat_(halfFloat), index_(mesh) {}
+    Checker(const TetMesh& mesh, std::span<const int> fields, const VdbFile& file, const Resampler& resampler,
+            bool halfFloat)
+        : mesh_(mesh),
+          fields_(fields),
+          file_(file),
+          resampler_(resampler),
+          halfFloat_(halfFloat),
+          index_(mesh) {}
 
     void check(std::size_t leaf, const Vec3i& local, SampleCheck& result) {
         const BrickKey& key = file_.tree.leaves()[leaf];
@@ -87,19 +94,25 @@ class Checker {
         result.covered += covered;
         const bool inside = std::any_of(places_.begin(), places_.end(), [&](const auto& found) {
             const auto& w = found.second.weights;
-            return *std::min_element(w.begin(), w.end()) > kSurelyInsideShare && found.second.depth > kSurelyInsideVoxels * spacing;
+            return *std::min_element(w.begin(), w.end()) > kSurelyInsideShare &&
+                   found.second.depth > kSurelyInsideVoxels * spacing;
         });
-        const auto where = [&] { return fmt::format("level {} point ({}, {}, {})", key.level, point.x, point.y, point.z); };
+        const auto where = [&] {
+            return fmt::format("level {} point ({}, {}, {})", key.level, point.x, point.y, point.z);
+        };
         if (!covered && inside) note(result, result.holes, where() + " lies in the mesh and is not covered");
-        if (covered && places_.empty()) note(result, result.spills, where() + " is covered and lies outside the mesh");
+        if (covered && places_.empty())
+            note(result, result.spills, where() + " is covered and lies outside the mesh");
         if (covered && !places_.empty()) checkValues(leaf, local, spacing, where(), result);
     }
 
   private:
     bool isCovered(std::size_t leaf, const Vec3i& p) const {
         const int n = file_.store.tilesPerEdge();
-        const Tile* tile = file_.store.tile(leaf, (p.x / kTileSize * n + p.y / kTileSize) * n + p.z / kTileSize);
-        return tile && tile->covered((p.x % kTileSize * kTileSize + p.y % kTileSize) * kTileSize + p.z % kTileSize);
+        const Tile* tile =
+            file_.store.tile(leaf, (p.x / kTileSize * n + p.y / kTileSize) * n + p.z / kTileSize);
+        return tile &&
+               tile->covered((p.x % kTileSize * kTileSize + p.y % kTileSize) * kTileSize + p.z % kTileSize);
     }
 
     /// A value that isn't finite is right where an element there depends on one.
@@ -123,7 +136,8 @@ class Checker {
 
     /// Elements within the spill bound of the point, so far as the distances to their sides tell.
     void findPlaces(const Vec3d& world, double spacing) {
-        // World coordinates of lattice points are rounded; on a mesh far from the origin that can exceed the bound itself.
+        // World coordinates of lattice points are rounded; on a mesh far from the origin that can exceed the
+        // bound itself.
         const double rounding = 4 * std::numeric_limits<double>::epsilon() *
                                 std::max({std::abs(world.x), std::abs(world.y), std::abs(world.z)});
         const double slack = resampler_.spillBoundVoxels() * spacing + rounding;
@@ -139,7 +153,8 @@ class Checker {
         }
     }
 
-    void checkValues(std::size_t leaf, const Vec3i& local, double spacing, const std::string& where, SampleCheck& result) {
+    void checkValues(std::size_t leaf, const Vec3i& local, double spacing, const std::string& where,
+                     SampleCheck& result) {
         int channel = 0;
         for (const int f : fields_) {
             const Field& field = mesh_.fields[std::size_t(f)];
@@ -148,15 +163,19 @@ class Checker {
                 const double stored = file_.store.value(leaf, local, channel, covered);
                 if (!std::isfinite(stored)) {
                     if (!mayBeInvalid(field))
-                        note(result, result.wrongValues, fmt::format("{}: {} has no finite value", where, field.name));
+                        note(result, result.wrongValues,
+                             fmt::format("{}: {} has no finite value", where, field.name));
                     continue;
                 }
                 double best = std::numeric_limits<double>::infinity();
                 for (const auto& [element, place] : places_)
-                    best = std::min(best, excess(mesh_, field, c, element, place, stored, resampler_.placeBoundVoxels() * spacing, halfFloat_));
+                    best = std::min(best, excess(mesh_, field, c, element, place, stored,
+                                                 resampler_.placeBoundVoxels() * spacing, halfFloat_));
                 if (best <= 0) continue;
                 result.largestExcess = std::max(result.largestExcess, best);
-                note(result, result.wrongValues, fmt::format("{}: {} is {:.9g}, off by {:.3g} more than the contract allows", where, field.name, stored, best));
+                note(result, result.wrongValues,
+                     fmt::format("{}: {} is {:.9g}, off by {:.3g} more than the contract allows", where,
+                                 field.name, stored, best));
             }
         }
     }
@@ -173,8 +192,9 @@ class Checker {
 
 }  // namespace
 
-SampleCheck checkSamples(const TetMesh& mesh, std::span<const int> fields, const VdbFile& file, const Resampler& resampler,
-                         bool halfFloat, std::int64_t samples, const Execution& execution) {
+SampleCheck checkSamples(const TetMesh& mesh, std::span<const int> fields, const VdbFile& file,
+                         const Resampler& resampler, bool halfFloat, std::int64_t samples,
+                         const Execution& execution) {
     SampleCheck result;
     Checker checker(mesh, fields, file, resampler, halfFloat);
     const std::int64_t edge = file.tree.brickCells();
@@ -186,7 +206,8 @@ SampleCheck checkSamples(const TetMesh& mesh, std::span<const int> fields, const
         execution.throwIfCancelled();
         execution.report("samples", i, stored);
         const std::int64_t rest = i % (edge * edge * edge);
-        checker.check(std::size_t(i / (edge * edge * edge)), {int(rest % edge), int(rest / edge % edge), int(rest / (edge * edge))}, result);
+        checker.check(std::size_t(i / (edge * edge * edge)),
+                      {int(rest % edge), int(rest / edge % edge), int(rest / (edge * edge))}, result);
     }
     return result;
 }

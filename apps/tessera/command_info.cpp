@@ -13,13 +13,18 @@ namespace tessera {
 namespace {
 
 Json documentHead(const std::string& path) {
-    return {{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "info"}, {"input", path}};
+    return {{"schema", 1},
+            {"program", "tessera"},
+            {"version", TESSERA_VERSION},
+            {"command", "info"},
+            {"input", path}};
 }
 
 Json gridsJson(const VdbFile& file) {
     Json grids = Json::array();
     for (std::size_t g = 0; g < file.gridNames.size(); ++g)
-        grids.push_back({{"name", file.gridNames[g]}, {"active_voxels", g < file.gridVoxels.size() ? file.gridVoxels[g] : 0}});
+        grids.push_back({{"name", file.gridNames[g]},
+                         {"active_voxels", g < file.gridVoxels.size() ? file.gridVoxels[g] : 0}});
     return grids;
 }
 
@@ -27,14 +32,17 @@ int showVdb(const InfoArguments& arguments, Session& session) {
     const VdbFile file = readVdb(arguments.path);
     std::vector<std::vector<std::string>> rows{{"grid", "active voxels"}};
     for (std::size_t g = 0; g < file.gridNames.size(); ++g)
-        rows.push_back({file.gridNames[g], g < file.gridVoxels.size() ? formatCount(file.gridVoxels[g]) : ""});
+        rows.push_back(
+            {file.gridNames[g], g < file.gridVoxels.size() ? formatCount(file.gridVoxels[g]) : ""});
     const std::vector<LevelSummary> levels = summarizeLevels(file.tree, file.store);
     const Vec3d& origin = file.tree.originWorld();
     std::string text = fmt::format(
         "{}: OpenVDB file by Tessera {}, layout {}\n  from {}, algorithm {}, criterion {}\n"
-        "  lattice origin ({:.9g}, {:.9g}, {:.9g}), finest spacing {:.9g}, bricks of {}^3 cells, {:.9g} file units per world unit\n",
-        arguments.path, file.version, file.layout == VdbLayout::flat ? "flat" : "levels", file.sourceFile, file.algorithm,
-        file.criterion, origin.x, origin.y, origin.z, file.tree.spacingWorld(), file.tree.brickCells(), file.unitScale);
+        "  lattice origin ({:.9g}, {:.9g}, {:.9g}), finest spacing {:.9g}, bricks of {}^3 cells, {:.9g} file "
+        "units per world unit\n",
+        arguments.path, file.version, file.layout == VdbLayout::flat ? "flat" : "levels", file.sourceFile,
+        file.algorithm, file.criterion, origin.x, origin.y, origin.z, file.tree.spacingWorld(),
+        file.tree.brickCells(), file.unitScale);
     session.print(text + formatTable(rows) + levelsText(levels) + errorText(file.report));
     if (arguments.common.jsonPath.empty()) return 0;
     Json json = documentHead(arguments.path);
@@ -71,7 +79,8 @@ int showMesh(const InfoArguments& arguments, Session& session) {
 
 void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
     command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote")->required();
-    command.add_option("--time-step", arguments.timeStep, "files with several steps: which one, counted from 0 (default: the last)");
+    command.add_option("--time-step", arguments.timeStep,
+                       "files with several steps: which one, counted from 0 (default: the last)");
     addCommonOptions(command, arguments.common);
     command.footer("Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -");
 }

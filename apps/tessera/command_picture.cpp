@@ -18,7 +18,7 @@ namespace tessera {
 
 namespace {
 
-constexpr double kMargin = 0.02;   // around the covered points, as a share of their box
+constexpr double kMargin = 0.02;  // around the covered points, as a share of their box
 
 /// Box of the covered lattice points.
 Box3d coveredBounds(const VdbFile& file) {
@@ -34,7 +34,8 @@ Box3d coveredBounds(const VdbFile& file) {
             const Vec3i corner = first + kTileSize * Vec3i(t / (n * n), t / n % n, t % n);
             for (int offset = 0; offset < kTilePoints; ++offset)
                 if (tile->covered(offset))
-                    bounds.include(lattice.worldFromIndex(Vec3d(corner + Vec3i(offset / 64, offset / 8 % 8, offset % 8))));
+                    bounds.include(lattice.worldFromIndex(
+                        Vec3d(corner + Vec3i(offset / 64, offset / 8 % 8, offset % 8))));
         }
     }
     return bounds;
@@ -49,7 +50,8 @@ const OutputField& chooseField(const VdbFile& file, const std::string& name) {
     throw InputError(fmt::format("no field named '{}'; there are: {}", name, there.empty() ? "none" : there));
 }
 
-/// What a cell that is partly outside the mesh is filled from: the mesh itself, or, without it, fields without values.
+/// What a cell that is partly outside the mesh is filled from: the mesh itself, or, without it, fields
+/// without values.
 struct Outside {
     TetMesh mesh;
     std::vector<int> fields;
@@ -58,7 +60,8 @@ struct Outside {
 Outside readOutside(const PictureArguments& arguments, const VdbFile& file, const Execution& execution) {
     Outside outside;
     if (arguments.mesh.empty()) {
-        for (const OutputField& field : file.fields) outside.mesh.fields.push_back({field.name, FieldLocation::point, field.components, {}});
+        for (const OutputField& field : file.fields)
+            outside.mesh.fields.push_back({field.name, FieldLocation::point, field.components, {}});
         outside.fields.resize(file.fields.size());
         std::iota(outside.fields.begin(), outside.fields.end(), 0);
         return outside;
@@ -72,7 +75,9 @@ Outside readOutside(const PictureArguments& arguments, const VdbFile& file, cons
             return field.name == output.sourceName && field.components == output.components &&
                    (field.location == FieldLocation::point) == (output.location == "point");
         });
-        if (found == fields.end()) throw InputError(fmt::format("{} has no field '{}' as the .vdb file has", arguments.mesh, output.sourceName));
+        if (found == fields.end())
+            throw InputError(
+                fmt::format("{} has no field '{}' as the .vdb file has", arguments.mesh, output.sourceName));
         outside.fields.push_back(int(found - fields.begin()));
     }
     return outside;
@@ -80,16 +85,21 @@ Outside readOutside(const PictureArguments& arguments, const VdbFile& file, cons
 
 /// One component, or the length of a vector when none is asked for.
 ScalarImage sampleField(const VdbFile& file, const OutputField& field, const PictureArguments& arguments,
-                        const Reconstruction& reconstruction, const SliceOptions& slice, const Execution& execution) {
+                        const Reconstruction& reconstruction, const SliceOptions& slice,
+                        const Execution& execution) {
     if (arguments.component && *arguments.component >= field.components)
-        throw InputError(fmt::format("--component: {} has {} components, counted from 0, got {}", field.name, field.components, *arguments.component));
+        throw InputError(fmt::format("--component: {} has {} components, counted from 0, got {}", field.name,
+                                     field.components, *arguments.component));
     if (arguments.component || field.components == 1)
-        return sampleSlice(file.tree, reconstruction, field.firstChannel + arguments.component.value_or(0), slice, execution);
+        return sampleSlice(file.tree, reconstruction, field.firstChannel + arguments.component.value_or(0),
+                           slice, execution);
     ScalarImage image = sampleSlice(file.tree, reconstruction, field.firstChannel, slice, execution);
     for (float& value : image.values) value *= value;
     for (int c = 1; c < field.components; ++c) {
-        const ScalarImage more = sampleSlice(file.tree, reconstruction, field.firstChannel + c, slice, execution);
-        for (std::size_t i = 0; i < image.values.size(); ++i) image.values[i] += more.values[i] * more.values[i];
+        const ScalarImage more =
+            sampleSlice(file.tree, reconstruction, field.firstChannel + c, slice, execution);
+        for (std::size_t i = 0; i < image.values.size(); ++i)
+            image.values[i] += more.values[i] * more.values[i];
     }
     for (float& value : image.values) value = std::sqrt(value);
     return image;
@@ -120,17 +130,26 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
     command.add_option("vdb", a.input, "a .vdb file that tessera wrote (layout levels)")->required();
     command.add_option("-o,--output", a.output, "the .png file")->required();
     command.add_option("--field", a.field, "the field (default: the first)");
-    command.add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")->check(CLI::Range(0, 8));
-    command.add_option("--axis", a.axis, "the slice is normal to this axis")->check(CLI::IsMember({"x", "y", "z"}))->capture_default_str();
+    command
+        .add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")
+        ->check(CLI::Range(0, 8));
+    command.add_option("--axis", a.axis, "the slice is normal to this axis")
+        ->check(CLI::IsMember({"x", "y", "z"}))
+        ->capture_default_str();
     command.add_option("--at", a.at, "where along that axis, world units (default: the middle)");
     command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
-    command.add_option("--range", a.range, "values a,b at the ends of the colour map (default: those of the slice)");
+    command.add_option("--range", a.range,
+                       "values a,b at the ends of the colour map (default: those of the slice)");
     command.add_option("--mesh", a.mesh, "the mesh file: voxel cells that its surface cuts are drawn whole");
-    command.add_option("--pixels", a.pixels, "along the longer edge")->check(CLI::Range(16, 8192))->capture_default_str();
+    command.add_option("--pixels", a.pixels, "along the longer edge")
+        ->check(CLI::Range(16, 8192))
+        ->capture_default_str();
     command.add_flag("--bricks", a.bricks, "draw the edges of the bricks");
     addCommonOptions(command, a.common);
-    command.footer("Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
-                   "  tessera picture flow.vdb -o near.png --field velocity --bounds -1,-1,-1,1,1,1 --bricks --mesh flow.vtu");
+    command.footer(
+        "Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
+        "  tessera picture flow.vdb -o near.png --field velocity --bounds -1,-1,-1,1,1,1 --bricks --mesh "
+        "flow.vtu");
 }
 
 int runPicture(const PictureArguments& arguments) {
@@ -156,13 +175,15 @@ int runPicture(const PictureArguments& arguments) {
     options.title = fmt::format("{}  {} = {:.4g}", field.name, arguments.axis, slice.positionWorld);
     if (!arguments.range.empty()) {
         const std::vector<double> ends = parseNumbers("--range", arguments.range, 2);
-        if (!(ends[0] < ends[1])) throw InputError(fmt::format("--range: expected a < b, got '{}'", arguments.range));
+        if (!(ends[0] < ends[1]))
+            throw InputError(fmt::format("--range: expected a < b, got '{}'", arguments.range));
         options.min = ends[0];
         options.max = ends[1];
     }
     writeSlicePng(arguments.output, image, options);
-    session.print(fmt::format("{}: {} on the plane {} = {:.6g}, {} x {} pixels, values {:.6g} to {:.6g}\n", arguments.output, field.name,
-                              arguments.axis, slice.positionWorld, image.width, image.height, range.min, range.max));
+    session.print(fmt::format("{}: {} on the plane {} = {:.6g}, {} x {} pixels, values {:.6g} to {:.6g}\n",
+                              arguments.output, field.name, arguments.axis, slice.positionWorld, image.width,
+                              image.height, range.min, range.max));
     if (!arguments.common.jsonPath.empty())
         writeJson(arguments.common.jsonPath, Json{{"schema", 1},
                                                   {"program", "tessera"},

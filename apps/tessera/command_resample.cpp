@@ -33,10 +33,12 @@ std::string numberedName(const std::string& pattern, std::size_t number) {
 std::vector<Step> listSteps(const ResampleArguments& arguments) {
     const std::vector<std::string> inputs = listSeries(arguments.input);
     if (inputs.size() > 1 && !arguments.output.empty() && arguments.output.find('#') == std::string::npos)
-        throw InputError(fmt::format("{} names {} files: the output needs #### for the step's number, got '{}'", arguments.input,
-                                     inputs.size(), arguments.output));
+        throw InputError(
+            fmt::format("{} names {} files: the output needs #### for the step's number, got '{}'",
+                        arguments.input, inputs.size(), arguments.output));
     std::vector<Step> steps;
-    for (std::size_t i = 0; i < inputs.size(); ++i) steps.push_back({inputs[i], numberedName(arguments.output, i)});
+    for (std::size_t i = 0; i < inputs.size(); ++i)
+        steps.push_back({inputs[i], numberedName(arguments.output, i)});
     return steps;
 }
 
@@ -69,11 +71,12 @@ class ResampleRun {
     void surveySeries(const std::vector<Step>& steps);
     void surveySpacing(const TetMesh& mesh);
     Json runStep(const Step& step);
-    Json dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times);
-    Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
-                        StageTimes& times);
-    VdbWriteResult write(const Step& step, const MeshFile& file, const FieldSelection& selection, BrickResult& result,
-                         StageTimes& times);
+    Json dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
+                StageTimes& times);
+    Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                        const RefineOptions& options, StageTimes& times);
+    VdbWriteResult write(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                         BrickResult& result, StageTimes& times);
     void printResult(const Step& step, const BrickResult& result, const std::vector<LevelSummary>& levels,
                      const VdbWriteResult& written, const StageTimes& times);
 
@@ -119,8 +122,13 @@ int ResampleRun::run() {
         writeJson(arguments_.common.jsonPath, reports[0]);
         return 0;
     }
-    Json document{{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "resample"},
-                  {"stages", stagesJson(allTimes_)}, {"peak_memory_bytes", peakMemoryBytes()}, {"series", series_}};
+    Json document{{"schema", 1},
+                  {"program", "tessera"},
+                  {"version", TESSERA_VERSION},
+                  {"command", "resample"},
+                  {"stages", stagesJson(allTimes_)},
+                  {"peak_memory_bytes", peakMemoryBytes()},
+                  {"series", series_}};
     document["steps"] = std::move(reports);
     writeJson(arguments_.common.jsonPath, document);
     return 0;
@@ -133,7 +141,8 @@ MeshFile ResampleRun::read(const Step& step) {
 
 RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {
     RefineOptions options = settings_.refine;
-    for (const std::string& name : settings_.errorFields) options.errorFields.push_back(findSelected(mesh, selection.fields, name));
+    for (const std::string& name : settings_.errorFields)
+        options.errorFields.push_back(findSelected(mesh, selection.fields, name));
     return options;
 }
 
@@ -150,20 +159,22 @@ void ResampleRun::surveySeries(const std::vector<Step>& steps) {
         if (!frameGiven) surveySpacing(mesh);
     }
     if (!frameGiven) settings_.refine.frame = seriesFrame_;
-    settings_.refine.resolution = 0;   // the frame holds the spacing from here on
+    settings_.refine.resolution = 0;  // the frame holds the spacing from here on
     settings_.refine.spacingWorld = 0;
     series_ = seriesJson(steps.size(), bounds, ranges);
-    session_.print(fmt::format("series of {} steps, finest spacing {:.6g}\n{}", steps.size(), settings_.refine.frame->spacingWorld,
-                               fieldsText(ranges)));
+    session_.print(fmt::format("series of {} steps, finest spacing {:.6g}\n{}", steps.size(),
+                               settings_.refine.frame->spacingWorld, fieldsText(ranges)));
 }
 
-/// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing shows well.
+/// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing
+/// shows well.
 void ResampleRun::surveySpacing(const TetMesh& mesh) {
     const FieldSelection selection = selectFields(mesh, settings_.fields);
     const RefineOptions options = stepOptions(mesh, selection);
-    const BrickTree tree = options.criterion == Criterion::error
-                               ? refineAndResample(mesh, selection.fields, resampler_, options, session_.execution).tree
-                               : planBricks(mesh, options, session_.execution, selection.channels);
+    const BrickTree tree =
+        options.criterion == Criterion::error
+            ? refineAndResample(mesh, selection.fields, resampler_, options, session_.execution).tree
+            : planBricks(mesh, options, session_.execution, selection.channels);
     if (!seriesFrame_ || tree.spacingWorld() < seriesFrame_->spacingWorld)
         seriesFrame_ = FixedFrame{tree.originWorld(), tree.spacingWorld()};
 }
@@ -178,11 +189,18 @@ Json ResampleRun::runStep(const Step& step) {
     const RefineOptions options = stepOptions(file.mesh, selection);
     session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
 
-    Json report{{"schema", 1}, {"program", "tessera"}, {"version", TESSERA_VERSION}, {"command", "resample"},
-                {"input", step.input}, {"output", arguments_.dryRun ? Json(nullptr) : Json(step.output)},
-                {"algorithm", arguments_.algorithm}, {"criterion", arguments_.refine}, {"layout", arguments_.layout},
+    Json report{{"schema", 1},
+                {"program", "tessera"},
+                {"version", TESSERA_VERSION},
+                {"command", "resample"},
+                {"input", step.input},
+                {"output", arguments_.dryRun ? Json(nullptr) : Json(step.output)},
+                {"algorithm", arguments_.algorithm},
+                {"criterion", arguments_.refine},
+                {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
-    Json rest = arguments_.dryRun ? dryRun(file, selection, options, times) : sampleAndWrite(step, file, selection, options, times);
+    Json rest = arguments_.dryRun ? dryRun(file, selection, options, times)
+                                  : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
     report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
     report.update(rest);
@@ -191,13 +209,15 @@ Json ResampleRun::runStep(const Step& step) {
     return report;
 }
 
-Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options, StageTimes& times) {
+Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
+                         StageTimes& times) {
     Timer timer;
     BrickTree tree;
     std::vector<std::string> notes;
     if (options.criterion == Criterion::error) {
         // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
-        BrickResult result = refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
+        BrickResult result =
+            refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
         tree = std::move(result.tree);
         notes = std::move(result.notes);
     } else {
@@ -205,7 +225,8 @@ Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, 
     }
     times.planMs = timer.elapsedMs();
     const PlanEstimate estimate = estimatePlan(tree, selection.channels);
-    const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels, resampler_, session_.execution);
+    const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels,
+                                            resampler_, session_.execution);
     std::string text = estimateText(estimate, cost.levelsMs, cost.flatMs);
     for (const std::string& note : notes) text += "  " + note + "\n";
     session_.print(text + "  nothing was written\n");
@@ -215,8 +236,8 @@ Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, 
     return json;
 }
 
-VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const FieldSelection& selection, BrickResult& result,
-                                  StageTimes& times) {
+VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                                  BrickResult& result, StageTimes& times) {
     Timer timer;
     std::optional<NearestPointIndex> nearest;
     std::optional<Reconstruction> reconstruction;
@@ -225,25 +246,28 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     if (flat || arguments_.extendLayers > 0) nearest.emplace(file.mesh, session_.execution.threadCount());
     if (flat) reconstruction.emplace(file.mesh, selection.fields, result.tree, result.store, *nearest);
     if (arguments_.extendLayers > 0)
-        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest, arguments_.extendLayers,
-                                  session_.execution);
+        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest,
+                                  arguments_.extendLayers, session_.execution);
     times.extendMs = timer.restart();
     VdbWriteOptions options = settings_.write;
     options.sourceFile = std::filesystem::path(step.input).filename().string();
-    VdbWriteResult written = writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
-                                      reconstruction ? &*reconstruction : nullptr, options, session_.execution);
+    VdbWriteResult written =
+        writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
+                 reconstruction ? &*reconstruction : nullptr, options, session_.execution);
     times.writeMs = timer.elapsedMs();
     return written;
 }
 
 Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
                                  const RefineOptions& options, StageTimes& times) {
-    BrickResult result = refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
+    BrickResult result =
+        refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
     times.planMs = result.times.planMs;
     times.resampleMs = result.times.resampleMs;
     times.verifyMs = result.times.verifyMs;
     for (std::size_t f = 0; f < selection.outputs.size() && f < result.report.fields.size(); ++f)
-        result.report.fields[f].name = selection.outputs[f].name;   // grid names are unique, names in the mesh need not be
+        result.report.fields[f].name =
+            selection.outputs[f].name;  // grid names are unique, names in the mesh need not be
     const std::vector<LevelSummary> levels = summarizeLevels(result.tree, result.store);
     const std::int64_t sampleBytes = result.store.memoryBytes();
     const VdbWriteResult written = write(step, file, selection, result, times);
@@ -253,9 +277,12 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     json["coverage"] = coverageJson(result.report);
     json["error"] = errorJson(result.report);
     if (options.criterion == Criterion::error)
-        json["refinement"] = {{"max_error", options.maxError}, {"relative", options.maxErrorIsRelative},
-                              {"measure", arguments_.errorMeasure}, {"bounded", result.bounded},
-                              {"stopped_because", result.stoppedBecause}, {"rounds", result.rounds}};
+        json["refinement"] = {{"max_error", options.maxError},
+                              {"relative", options.maxErrorIsRelative},
+                              {"measure", arguments_.errorMeasure},
+                              {"bounded", result.bounded},
+                              {"stopped_because", result.stoppedBecause},
+                              {"rounds", result.rounds}};
     json["notes"] = result.notes;
     json["statistics"] = statisticsJson(result.statistics);
     json["write"] = writeResultJson(written);
@@ -263,22 +290,27 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     return json;
 }
 
-void ResampleRun::printResult(const Step& step, const BrickResult& result, const std::vector<LevelSummary>& levels,
-                              const VdbWriteResult& written, const StageTimes& times) {
+void ResampleRun::printResult(const Step& step, const BrickResult& result,
+                              const std::vector<LevelSummary>& levels, const VdbWriteResult& written,
+                              const StageTimes& times) {
     std::string text = levelsText(levels) + errorText(result.report);
     if (settings_.refine.criterion == Criterion::error)
-        text += result.bounded ? "  the error is within the bound\n"
-                               : fmt::format("  the error is NOT within the bound: {}\n", result.stoppedBecause);
+        text += result.bounded
+                    ? "  the error is within the bound\n"
+                    : fmt::format("  the error is NOT within the bound: {}\n", result.stoppedBecause);
     for (const std::string& note : result.notes) text += "  " + note + "\n";
     for (const std::string& note : written.notes) text += "  " + note + "\n";
     text += stagesText(times);
-    text += fmt::format("{}: {}, {} active voxels; peak memory {}\n", step.output, formatBytes(written.fileBytes),
-                        formatCount(written.activeVoxels), formatBytes(peakMemoryBytes()));
+    text +=
+        fmt::format("{}: {}, {} active voxels; peak memory {}\n", step.output, formatBytes(written.fileBytes),
+                    formatCount(written.activeVoxels), formatBytes(peakMemoryBytes()));
     session_.print(text);
 }
 
 }  // namespace
 
-int runResample(const ResampleArguments& arguments) { return ResampleRun(arguments).run(); }
+int runResample(const ResampleArguments& arguments) {
+    return ResampleRun(arguments).run();
+}
 
 }  // namespace tessera

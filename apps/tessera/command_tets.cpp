@@ -11,7 +11,8 @@ namespace tessera {
 void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
     command.add_option("mesh", arguments.input, "mesh file")->required();
     command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra")->required();
-    command.add_option("--time-step", arguments.timeStep, "files with several steps: which one, counted from 0 (default: the last)");
+    command.add_option("--time-step", arguments.timeStep,
+                       "files with several steps: which one, counted from 0 (default: the last)");
     addCommonOptions(command, arguments.common);
     command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
 }
@@ -26,8 +27,9 @@ int runTets(const TetsArguments& arguments) {
     session.execution.throwIfCancelled();
     writeTets(file.mesh, arguments.output);
     times.writeMs = timer.elapsedMs();
-    session.print(importText(arguments.input, file.statistics, file.mesh.boundsWorld()) +
-                  fmt::format("{}: {} tetrahedra\n", arguments.output, formatCount(file.mesh.elementCount())));
+    session.print(
+        importText(arguments.input, file.statistics, file.mesh.boundsWorld()) +
+        fmt::format("{}: {} tetrahedra\n", arguments.output, formatCount(file.mesh.elementCount())));
     if (arguments.common.jsonPath.empty()) return 0;
     writeJson(arguments.common.jsonPath,
               Json{{"schema", 1},

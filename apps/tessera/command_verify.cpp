@@ -18,8 +18,8 @@ namespace tessera {
 namespace {
 
 constexpr int kExitClaimFails = 2;
-constexpr double kRounding = 1e-9;              // of the claimed figure
-constexpr double kFloatRounding = 1.0 / (1 << 21);   // of the largest value
+constexpr double kRounding = 1e-9;                  // of the claimed figure
+constexpr double kFloatRounding = 1.0 / (1 << 21);  // of the largest value
 constexpr double kHalfRounding = 1.0 / (1 << 10);
 
 /// Index into mesh.fields for each field of the file. Throws InputError when the mesh does not have it so.
@@ -31,8 +31,9 @@ std::vector<int> matchFields(const TetMesh& mesh, const VdbFile& file, const std
                    (field.location == FieldLocation::point) == (output.location == "point");
         });
         if (found == mesh.fields.end())
-            throw InputError(fmt::format("{} has no {} field '{}' of {} components, which the .vdb file was made from", meshPath,
-                                         output.location, output.sourceName, output.components));
+            throw InputError(
+                fmt::format("{} has no {} field '{}' of {} components, which the .vdb file was made from",
+                            meshPath, output.location, output.sourceName, output.components));
         fields.push_back(int(found - mesh.fields.begin()));
     }
     return fields;
@@ -53,19 +54,24 @@ struct Comparison {
     }
 };
 
-std::vector<Comparison> compareReports(const TetMesh& mesh, std::span<const int> fields, const ErrorReport& claimed,
-                                       const ErrorReport& measured, bool halfFloat) {
+std::vector<Comparison> compareReports(const TetMesh& mesh, std::span<const int> fields,
+                                       const ErrorReport& claimed, const ErrorReport& measured,
+                                       bool halfFloat) {
     std::vector<Comparison> rows;
-    const auto count = [&](const char* figure, std::int64_t a, std::int64_t b) { rows.push_back({"", figure, double(a), double(b), 0}); };
+    const auto count = [&](const char* figure, std::int64_t a, std::int64_t b) {
+        rows.push_back({"", figure, double(a), double(b), 0});
+    };
     count("covered points", claimed.coveredPoints, measured.coveredPoints);
     count("nodes", claimed.nodes, measured.nodes);
     count("centroids", claimed.centroids, measured.centroids);
     if (claimed.fields.size() != measured.fields.size())
-        throw InputError(fmt::format("the file's error report has {} fields, the file {}", claimed.fields.size(), measured.fields.size()));
+        throw InputError(fmt::format("the file's error report has {} fields, the file {}",
+                                     claimed.fields.size(), measured.fields.size()));
     for (std::size_t f = 0; f < claimed.fields.size(); ++f) {
         const FieldError &a = claimed.fields[f], &b = measured.fields[f];
         const double rounding = halfFloat ? kHalfRounding : kFloatRounding;
-        const double valueError = rounding * std::max(1.0, std::sqrt(double(b.components))) * largestValue(mesh.fields[std::size_t(fields[f])]);
+        const double valueError = rounding * std::max(1.0, std::sqrt(double(b.components))) *
+                                  largestValue(mesh.fields[std::size_t(fields[f])]);
         const auto add = [&](const char* figure, double x, double y) {
             rows.push_back({a.name, figure, x, y, kRounding * std::abs(x) + valueError});
         };
@@ -78,52 +84,67 @@ std::vector<Comparison> compareReports(const TetMesh& mesh, std::span<const int>
 }
 
 std::string comparisonText(const std::vector<Comparison>& rows) {
-    std::vector<std::vector<std::string>> table{{"field", "figure", "in the file", "measured", "difference", ""}};
+    std::vector<std::vector<std::string>> table{
+        {"field", "figure", "in the file", "measured", "difference", ""}};
     for (const Comparison& r : rows)
-        table.push_back({r.field.empty() ? "(all)" : r.field, r.figure, fmt::format("{:.9g}", r.claimed), fmt::format("{:.9g}", r.measured),
-                         fmt::format("{:.2g}", r.measured - r.claimed), r.holds() ? "holds" : "DOES NOT HOLD"});
+        table.push_back({r.field.empty() ? "(all)" : r.field, r.figure, fmt::format("{:.9g}", r.claimed),
+                         fmt::format("{:.9g}", r.measured), fmt::format("{:.2g}", r.measured - r.claimed),
+                         r.holds() ? "holds" : "DOES NOT HOLD"});
     return formatTable(table);
 }
 
 Json comparisonJson(const std::vector<Comparison>& rows) {
     Json list = Json::array();
     for (const Comparison& r : rows)
-        list.push_back({{"field", r.field}, {"figure", r.figure}, {"claimed", r.claimed}, {"measured", r.measured},
-                        {"allowed_difference", r.allowed}, {"holds", r.holds()}});
+        list.push_back({{"field", r.field},
+                        {"figure", r.figure},
+                        {"claimed", r.claimed},
+                        {"measured", r.measured},
+                        {"allowed_difference", r.allowed},
+                        {"holds", r.holds()}});
     return list;
 }
 
 Json sampleJson(const SampleCheck& check) {
-    return {{"points", check.points},           {"covered", check.covered},
-            {"holes", check.holes},             {"spills", check.spills},
-            {"wrong_values", check.wrongValues}, {"largest_excess", check.largestExcess}};
+    return {{"points", check.points},
+            {"covered", check.covered},
+            {"holes", check.holes},
+            {"spills", check.spills},
+            {"wrong_values", check.wrongValues},
+            {"largest_excess", check.largestExcess}};
 }
 
 std::string sampleText(const SampleCheck& check) {
-    return fmt::format("  {} stored points evaluated directly: {} covered, {} holes, {} spills, {} wrong values\n{}", formatCount(check.points),
-                       formatCount(check.covered), check.holes, check.spills, check.wrongValues,
-                       check.firstProblem.empty() ? "" : "  " + check.firstProblem + "\n");
+    return fmt::format(
+        "  {} stored points evaluated directly: {} covered, {} holes, {} spills, {} wrong values\n{}",
+        formatCount(check.points), formatCount(check.covered), check.holes, check.spills, check.wrongValues,
+        check.firstProblem.empty() ? "" : "  " + check.firstProblem + "\n");
 }
 
 }  // namespace
 
 void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
-    command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")->required();
+    command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")
+        ->required();
     command.add_option("vdb", arguments.vdbPath, "the .vdb file (layout levels)")->required();
-    command.add_option("--time-step", arguments.timeStep, "files with several steps: which one, counted from 0 (default: the last)");
+    command.add_option("--time-step", arguments.timeStep,
+                       "files with several steps: which one, counted from 0 (default: the last)");
     command.add_option("--samples", arguments.samples, "stored voxels to evaluate one by one")
         ->check(CLI::Range(0, 1000000000))
         ->capture_default_str();
     addCommonOptions(command, arguments.common);
-    command.footer("Measures the error anew and compares it with what the file says. Exit code 2 when a claim does not hold.\n"
-                   "Example:\n  tessera verify mesh.vtu out.vdb");
+    command.footer(
+        "Measures the error anew and compares it with what the file says. Exit code 2 when a claim does not "
+        "hold.\n"
+        "Example:\n  tessera verify mesh.vtu out.vdb");
 }
 
 int runVerify(const VerifyArguments& arguments) {
     Session session(arguments.common);
     VdbFile file = readVdb(arguments.vdbPath);
     if (file.layout != VdbLayout::levels)
-        throw InputError(fmt::format("{}: only files of layout levels hold the exact samples that verify needs", arguments.vdbPath));
+        throw InputError(fmt::format(
+            "{}: only files of layout levels hold the exact samples that verify needs", arguments.vdbPath));
     ReadOptions options;
     options.timeStep = arguments.timeStep;
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
@@ -133,15 +154,18 @@ int runVerify(const VerifyArguments& arguments) {
     times.readMs = timer.restart();
     const std::vector<int> fields = matchFields(mesh, file, arguments.meshPath);
     const NearestPointIndex nearest(mesh, session.execution.threadCount());
-    const ErrorReport measured = measureError(mesh, fields, file.tree, file.store, nearest, session.execution);
+    const ErrorReport measured =
+        measureError(mesh, fields, file.tree, file.store, nearest, session.execution);
     const std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
-    const SampleCheck samples = checkSamples(mesh, fields, file, findResampler(file.algorithm), file.halfFloat, arguments.samples,
-                                             session.execution);
+    const SampleCheck samples = checkSamples(mesh, fields, file, findResampler(file.algorithm),
+                                             file.halfFloat, arguments.samples, session.execution);
     times.verifyMs = timer.elapsedMs();
-    const bool holds = samples.good() && std::all_of(rows.begin(), rows.end(), [](const Comparison& r) { return r.holds(); });
+    const bool holds = samples.good() &&
+                       std::all_of(rows.begin(), rows.end(), [](const Comparison& r) { return r.holds(); });
 
-    session.print(fmt::format("{} against {}\n", arguments.vdbPath, arguments.meshPath) + comparisonText(rows) + errorText(measured) +
-                  sampleText(samples) + (holds ? "verified: the file's claims hold\n" : ""));
+    session.print(fmt::format("{} against {}\n", arguments.vdbPath, arguments.meshPath) +
+                  comparisonText(rows) + errorText(measured) + sampleText(samples) +
+                  (holds ? "verified: the file's claims hold\n" : ""));
     if (!arguments.common.jsonPath.empty())
         writeJson(arguments.common.jsonPath, Json{{"schema", 1},
                                                   {"program", "tessera"},
@@ -155,7 +179,9 @@ int runVerify(const VerifyArguments& arguments) {
                                                   {"coverage", coverageJson(measured)},
                                                   {"error", errorJson(measured)},
                                                   {"stages", stagesJson(times)}});
-    if (!holds) throw InputError(fmt::format("{}: its claims do not hold for {}", arguments.vdbPath, arguments.meshPath));
+    if (!holds)
+        throw InputError(
+            fmt::format("{}: its claims do not hold for {}", arguments.vdbPath, arguments.meshPath));
     return 0;
 }
 

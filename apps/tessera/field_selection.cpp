@@ -56,7 +56,8 @@ std::string gridName(const TetMesh& mesh, const Field& field, std::set<std::stri
 
 }  // namespace
 
-std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices, const std::vector<std::string>& errorFields) {
+std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices,
+                                     const std::vector<std::string>& errorFields) {
     std::vector<std::string> names;
     if (choices.empty()) return names;
     for (const FieldChoice& choice : choices) names.push_back(withoutLocation(choice.source));
@@ -72,7 +73,8 @@ FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>&
     const auto add = [&](int f, const std::string& name) {
         const Field& field = mesh.fields[std::size_t(f)];
         selection.fields.push_back(f);
-        selection.outputs.push_back({name, field.name, field.location == FieldLocation::point ? "point" : "cell",
+        selection.outputs.push_back({name, field.name,
+                                     field.location == FieldLocation::point ? "point" : "cell",
                                      field.components, selection.channels});
         selection.channels += field.components;
     };

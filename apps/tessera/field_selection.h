@@ -10,7 +10,8 @@
 namespace tessera {
 
 /// Names to ask a reader for: those of the choices without a "point:" or "cell:" in front. Empty: all.
-std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices, const std::vector<std::string>& errorFields);
+std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices,
+                                     const std::vector<std::string>& errorFields);
 
 /// The chosen fields: indices into mesh.fields, and how each is named in the output.
 struct FieldSelection {
@@ -19,8 +20,9 @@ struct FieldSelection {
     int channels = 0;
 };
 
-/// No choices: every field; a cell field with the name of a point field gets "_cell" appended. A choice may say "point:T" or "cell:T"; without,
-/// the point field is taken where there are both. Throws InputError listing the fields there are when one is missing.
+/// No choices: every field; a cell field with the name of a point field gets "_cell" appended. A choice may
+/// say "point:T" or "cell:T"; without, the point field is taken where there are both. Throws InputError
+/// listing the fields there are when one is missing.
 FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>& choices);
 
 /// Index into mesh.fields for a name as above, among `fields`. Throws InputError.

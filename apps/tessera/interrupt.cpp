@@ -30,13 +30,18 @@ void installInterruptHandlers() {
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
-    // A file size limit and a closed pipe are reported by write(); the default action would kill the process before it cleans up.
+    // A file size limit and a closed pipe are reported by write(); the default action would kill the process
+    // before it cleans up.
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
 }
 
-const std::atomic<bool>& interruptFlag() { return raised; }
+const std::atomic<bool>& interruptFlag() {
+    return raised;
+}
 
-int interruptSignal() { return signalNumber; }
+int interruptSignal() {
+    return signalNumber;
+}
 
 }  // namespace tessera

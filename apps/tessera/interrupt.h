@@ -4,8 +4,8 @@
 
 namespace tessera {
 
-/// Turns the first SIGINT or SIGTERM into a raised flag, which ends the work in order. The second one ends the process at once, after
-/// removing unfinished files.
+/// Turns the first SIGINT or SIGTERM into a raised flag, which ends the work in order. The second one ends
+/// the process at once, after removing unfinished files.
 void installInterruptHandlers();
 /// True after a signal.
 const std::atomic<bool>& interruptFlag();

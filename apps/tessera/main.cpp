@@ -37,14 +37,21 @@ void describe(CLI::App& app, Arguments& arguments) {
     app.set_help_flag("-h,--help", "print this help and exit");
     app.require_subcommand(1);
     app.get_formatter()->column_width(34);
-    app.footer("Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit codes: 0 done, "
-               "2 bad input or usage, 1 any other failure, 130 interrupted.");
-    tessera::addResampleOptions(*app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
-                                arguments.resample);
-    tessera::addInfoOptions(*app.add_subcommand("info", "what a mesh file or a .vdb file holds"), arguments.info);
-    tessera::addVerifyOptions(*app.add_subcommand("verify", "check a .vdb file's error report against its mesh"), arguments.verify);
-    tessera::addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"), arguments.tets);
-    tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"), arguments.picture);
+    app.footer(
+        "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
+        "codes: 0 done, "
+        "2 bad input or usage, 1 any other failure, 130 interrupted.");
+    tessera::addResampleOptions(
+        *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
+        arguments.resample);
+    tessera::addInfoOptions(*app.add_subcommand("info", "what a mesh file or a .vdb file holds"),
+                            arguments.info);
+    tessera::addVerifyOptions(
+        *app.add_subcommand("verify", "check a .vdb file's error report against its mesh"), arguments.verify);
+    tessera::addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"),
+                            arguments.tets);
+    tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
+                               arguments.picture);
 }
 
 int run(const CLI::App& app, const Arguments& arguments) {
@@ -64,7 +71,7 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) return app.exit(error);   // --help, --version
+        if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
         printError(fmt::format("{} (tessera --help tells more)", error.what()).c_str());
         return kExitBadInput;
     }

@@ -42,59 +42,96 @@ void require(bool holds, const std::string& message) {
 }
 
 void requirePositive(const std::string& option, double value) {
-    require(std::isfinite(value) && value > 0, fmt::format("{}: expected a number above 0, got {}", option, value));
+    require(std::isfinite(value) && value > 0,
+            fmt::format("{}: expected a number above 0, got {}", option, value));
 }
 
 void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     const std::string group = "Where to sample how finely";
-    command.add_option("--refine", a.refine,
-                       "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
-                       "the measured error is within --max-error")
+    command
+        .add_option(
+            "--refine", a.refine,
+            "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
+            "the measured error is within --max-error")
         ->check(CLI::IsMember({"uniform", "element-size", "error"}))
         ->capture_default_str()
         ->group(group);
-    command.add_option("--resolution", a.resolution, "lattice points along the longest axis, at the finest level")->group(group);
+    command
+        .add_option("--resolution", a.resolution,
+                    "lattice points along the longest axis, at the finest level")
+        ->group(group);
     command.add_option("--spacing", a.spacing, "spacing of the finest level, in world units")->group(group);
-    command.add_option("--samples-per-element", a.samplesPerElement, "element-size: samples along a typical element edge")
+    command
+        .add_option("--samples-per-element", a.samplesPerElement,
+                    "element-size: samples along a typical element edge")
         ->capture_default_str()
         ->group(group);
-    command.add_option("--max-levels", a.maxLevels, "levels of spacing at most, each twice the one below (default: 8; for error no bound)")
+    command
+        .add_option("--max-levels", a.maxLevels,
+                    "levels of spacing at most, each twice the one below (default: 8; for error no bound)")
         ->group(group);
-    command.add_option("--max-error", a.maxError, "error: bound in field units, or a share of each field's range such as 1%")
+    command
+        .add_option("--max-error", a.maxError,
+                    "error: bound in field units, or a share of each field's range such as 1%")
         ->group(group);
     command.add_option("--error-measure", a.errorMeasure, "error: which figure the bound holds for")
         ->check(CLI::IsMember({"max", "rms"}))
         ->capture_default_str()
         ->group(group);
-    command.add_option("--error-field", a.errorFields, "error: fields a,b that the bound holds for (default: all point fields chosen)")
+    command
+        .add_option("--error-field", a.errorFields,
+                    "error: fields a,b that the bound holds for (default: all point fields chosen)")
         ->group(group);
-    command.add_option("--brick-size", a.brickSize, "cells along a brick's edge: 8, 16, 32 or 64")->capture_default_str()->group(group);
-    command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")->group(group);
-    command.add_option("--like", a.like, "use the lattice (origin and finest spacing) of this .vdb file")->group(group);
-    command.add_option("--max-voxels", a.maxVoxels, "bound on stored voxels, e.g. 500M (default: from the memory there is)")->group(group);
+    command.add_option("--brick-size", a.brickSize, "cells along a brick's edge: 8, 16, 32 or 64")
+        ->capture_default_str()
+        ->group(group);
+    command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")
+        ->group(group);
+    command.add_option("--like", a.like, "use the lattice (origin and finest spacing) of this .vdb file")
+        ->group(group);
+    command
+        .add_option("--max-voxels", a.maxVoxels,
+                    "bound on stored voxels, e.g. 500M (default: from the memory there is)")
+        ->group(group);
     command.add_option("--max-memory", a.maxMemory, "bound on the samples' memory, e.g. 4G")->group(group);
-    command.add_flag("--dry-run", a.dryRun, "print voxels, bytes and predicted time of each layout; write nothing")->group(group);
+    command
+        .add_flag("--dry-run", a.dryRun,
+                  "print voxels, bytes and predicted time of each layout; write nothing")
+        ->group(group);
 }
 
 void addOutputOptions(CLI::App& command, ResampleArguments& a) {
     const std::string group = "What to write";
     command.add_option("--field", a.fields, "fields to sample: a,b=newname,... (default: all)")->group(group);
-    command.add_option("--layout", a.layout, "levels: one grid a field and level. flat: one grid a field at the finest spacing")
+    command
+        .add_option("--layout", a.layout,
+                    "levels: one grid a field and level. flat: one grid a field at the finest spacing")
         ->check(CLI::IsMember({"levels", "flat"}))
         ->capture_default_str()
         ->group(group);
     command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
-    command.add_option("--extend", a.extendLayers, "layers of voxels written outside the mesh, with the value at the nearest mesh point")
+    command
+        .add_option("--extend", a.extendLayers,
+                    "layers of voxels written outside the mesh, with the value at the nearest mesh point")
         ->capture_default_str()
         ->group(group);
-    command.add_option("--background", a.background, "value of voxels that are not stored")->capture_default_str()->group(group);
-    command.add_option("--unit-scale", a.unitScale, "file units per world unit (default: 1, or a power of ten when voxels are tiny)")
+    command.add_option("--background", a.background, "value of voxels that are not stored")
+        ->capture_default_str()
         ->group(group);
-    command.add_option("--up-axis", a.upAxis, "turn the grid so that this axis of the file points up: keep, y or z")
+    command
+        .add_option("--unit-scale", a.unitScale,
+                    "file units per world unit (default: 1, or a power of ten when voxels are tiny)")
+        ->group(group);
+    command
+        .add_option("--up-axis", a.upAxis,
+                    "turn the grid so that this axis of the file points up: keep, y or z")
         ->check(CLI::IsMember({"keep", "y", "z"}))
         ->capture_default_str()
         ->group(group);
-    command.add_option("--time-step", a.timeStep, "files with several steps: which one, counted from 0 (default: the last)")->group(group);
+    command
+        .add_option("--time-step", a.timeStep,
+                    "files with several steps: which one, counted from 0 (default: the last)")
+        ->group(group);
     command.add_option("--algorithm", a.algorithm, "the resampler")->capture_default_str()->group(group);
 }
 
@@ -105,7 +142,8 @@ void checkRanges(const ResampleArguments& a) {
     if (a.spacing) requirePositive("--spacing", *a.spacing);
     require(!(a.spacing && a.resolution), "--spacing and --resolution exclude each other");
     requirePositive("--samples-per-element", a.samplesPerElement);
-    require(a.samplesPerElement <= 1000, fmt::format("--samples-per-element: expected at most 1000, got {}", a.samplesPerElement));
+    require(a.samplesPerElement <= 1000,
+            fmt::format("--samples-per-element: expected at most 1000, got {}", a.samplesPerElement));
     if (a.maxLevels)
         require(*a.maxLevels >= 1 && *a.maxLevels <= kLargestLevels,
                 fmt::format("--max-levels: expected 1 to {}, got {}", kLargestLevels, *a.maxLevels));
@@ -113,7 +151,8 @@ void checkRanges(const ResampleArguments& a) {
             fmt::format("--brick-size: expected 8, 16, 32 or 64, got {}", a.brickSize));
     require(a.extendLayers >= 0 && a.extendLayers <= kLargestExtend,
             fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, a.extendLayers));
-    require(std::isfinite(a.background), fmt::format("--background: expected a finite number, got {}", a.background));
+    require(std::isfinite(a.background),
+            fmt::format("--background: expected a finite number, got {}", a.background));
     require(a.unitScale == 0 || (std::isfinite(a.unitScale) && a.unitScale > 0),
             fmt::format("--unit-scale: expected a number above 0, got {}", a.unitScale));
     require(a.timeStep >= -1, fmt::format("--time-step: expected 0 or more, got {}", a.timeStep));
@@ -124,7 +163,8 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     RefineOptions r;
     if (a.refine == "uniform") {
         r.criterion = Criterion::uniform;
-        require(a.resolution || a.spacing || !a.like.empty(), "--refine uniform needs --resolution N, --spacing h or --like file.vdb");
+        require(a.resolution || a.spacing || !a.like.empty(),
+                "--refine uniform needs --resolution N, --spacing h or --like file.vdb");
     } else if (a.refine == "error") {
         r.criterion = Criterion::error;
         require(a.maxError.has_value(), "--refine error needs --max-error (a number, or a share such as 1%)");
@@ -152,15 +192,20 @@ RefineOptions refineOptions(const ResampleArguments& a) {
 }  // namespace
 
 void addCommonOptions(CLI::App& command, CommonOptions& options) {
-    command.add_option("--threads", options.threads, "worker threads (default: one for every processor); the result never depends on it")
+    command
+        .add_option("--threads", options.threads,
+                    "worker threads (default: one for every processor); the result never depends on it")
         ->check(CLI::Range(0, 1024));
     command.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
-    command.add_option("--json", options.jsonPath, "write a report as JSON to this file, or to standard output for -");
+    command.add_option("--json", options.jsonPath,
+                       "write a report as JSON to this file, or to standard output for -");
 }
 
 void addResampleOptions(CLI::App& command, ResampleArguments& a) {
-    command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")->required();
-    command.add_option("-o,--output", a.output, "the .vdb file; #### stands for the step's number in a series");
+    command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")
+        ->required();
+    command.add_option("-o,--output", a.output,
+                       "the .vdb file; #### stands for the step's number in a series");
     addRefineOptions(command, a);
     addOutputOptions(command, a);
     addCommonOptions(command, a.common);
@@ -194,12 +239,14 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
 
 std::int64_t parseCount(const std::string& option, const std::string& text, bool binary) {
     const auto fail = [&] {
-        throw InputError(fmt::format("{}: expected a count above 0 such as 500K, 64M or 2G, got '{}'", option, text));
+        throw InputError(
+            fmt::format("{}: expected a count above 0 such as 500K, 64M or 2G, got '{}'", option, text));
     };
     std::string digits = text;
     double scale = 1;
     if (!digits.empty() && std::isalpha(static_cast<unsigned char>(digits.back()))) {
-        const std::size_t power = std::string("KMGT").find(char(std::toupper(static_cast<unsigned char>(digits.back()))));
+        const std::size_t power =
+            std::string("KMGT").find(char(std::toupper(static_cast<unsigned char>(digits.back()))));
         if (power == std::string::npos) fail();
         scale = std::pow(binary ? 1024.0 : 1000.0, double(power + 1));
         digits.pop_back();
@@ -217,7 +264,8 @@ std::vector<FieldChoice> parseFields(const std::string& text) {
     std::set<std::string> names;
     for (const std::string& part : split(text, ',')) {
         const std::size_t equals = part.find('=');
-        FieldChoice choice{part.substr(0, equals), equals == std::string::npos ? part : part.substr(equals + 1)};
+        FieldChoice choice{part.substr(0, equals),
+                           equals == std::string::npos ? part : part.substr(equals + 1)};
         if (choice.source.empty() || choice.name.empty())
             throw InputError(fmt::format("--field: expected a,b=newname,..., got '{}'", text));
         if (!names.insert(choice.name).second)
@@ -230,7 +278,8 @@ std::vector<FieldChoice> parseFields(const std::string& text) {
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, std::size_t count) {
     const std::vector<std::string> parts = split(text, ',');
     if (parts.size() != count)
-        throw InputError(fmt::format("{}: expected {} numbers with commas between them, got '{}'", option, count, text));
+        throw InputError(
+            fmt::format("{}: expected {} numbers with commas between them, got '{}'", option, count, text));
     std::vector<double> values;
     for (const std::string& part : parts) values.push_back(parseNumber(option, part));
     return values;
@@ -240,8 +289,8 @@ Box3d parseBounds(const std::string& text) {
     const std::vector<double> v = parseNumbers("--bounds", text, 6);
     const Box3d box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
     for (int axis = 0; axis < 3; ++axis)
-        require(box.min[axis] < box.max[axis],
-                fmt::format("--bounds: expected {0}0 < {0}1, got {1} and {2}", "xyz"[axis], box.min[axis], box.max[axis]));
+        require(box.min[axis] < box.max[axis], fmt::format("--bounds: expected {0}0 < {0}1, got {1} and {2}",
+                                                           "xyz"[axis], box.min[axis], box.max[axis]));
     return box;
 }
 

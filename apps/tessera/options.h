@@ -14,9 +14,9 @@ namespace tessera {
 
 /// Options of every subcommand.
 struct CommonOptions {
-    int threads = 0;         ///< 0: one for every processor
+    int threads = 0;  ///< 0: one for every processor
     bool quiet = false;
-    std::string jsonPath;    ///< empty: no report; "-": standard output
+    std::string jsonPath;  ///< empty: no report; "-": standard output
 };
 
 /// One entry of --field: a field of the mesh and the name of its grid.
@@ -29,7 +29,8 @@ struct FieldChoice {
 struct ResampleArguments {
     CommonOptions common;
     std::string input, output;
-    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max", algorithm = "software";
+    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max",
+                algorithm = "software";
     std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;
     std::optional<std::string> maxError;
@@ -48,8 +49,8 @@ struct ResampleArguments {
 struct ResampleSettings {
     RefineOptions refine;
     VdbWriteOptions write;
-    std::vector<FieldChoice> fields;        ///< empty: all
-    std::vector<std::string> errorFields;   ///< empty: all chosen point fields
+    std::vector<FieldChoice> fields;       ///< empty: all
+    std::vector<std::string> errorFields;  ///< empty: all chosen point fields
 };
 
 void addCommonOptions(CLI::App& command, CommonOptions& options);

@@ -13,8 +13,10 @@ struct CostPrediction {
     double flatMs = 0;
 };
 
-/// Samples a small, fixed choice of the leaves here and now and extrapolates; writing is reckoned at a typical rate of OpenVDB with Blosc.
-CostPrediction predictCost(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const PlanEstimate& estimate,
-                           int channels, const Resampler& resampler, const Execution& execution);
+/// Samples a small, fixed choice of the leaves here and now and extrapolates; writing is reckoned at a
+/// typical rate of OpenVDB with Blosc.
+CostPrediction predictCost(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                           const PlanEstimate& estimate, int channels, const Resampler& resampler,
+                           const Execution& execution);
 
 }  // namespace tessera

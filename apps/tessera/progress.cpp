@@ -15,7 +15,9 @@ constexpr std::int64_t kRedrawMs = 100;
 
 ProgressBar::ProgressBar(bool enabled) : enabled_(enabled && isatty(STDERR_FILENO) == 1) {}
 
-ProgressBar::~ProgressBar() { clear(); }
+ProgressBar::~ProgressBar() {
+    clear();
+}
 
 void ProgressBar::update(std::string_view stage, std::int64_t done, std::int64_t total) {
     if (!enabled_ || total <= 0) return;
@@ -26,7 +28,8 @@ void ProgressBar::update(std::string_view stage, std::int64_t done, std::int64_t
     std::lock_guard lock(mutex_);
     const double share = std::clamp(double(done) / double(total), 0.0, 1.0);
     const int filled = int(share * kBarWidth);
-    const std::string line = fmt::format("\r{:<10} [{:#<{}}{:.<{}}] {:3.0f} %", stage, "", filled, "", kBarWidth - filled, share * 100);
+    const std::string line = fmt::format("\r{:<10} [{:#<{}}{:.<{}}] {:3.0f} %", stage, "", filled, "",
+                                         kBarWidth - filled, share * 100);
     std::fputs(line.c_str(), stderr);
     std::fflush(stderr);
     drawn_ = true;

@@ -10,7 +10,8 @@
 
 namespace tessera {
 
-/// A progress bar on standard error: one line, redrawn a few times a second. Draws nothing unless standard error is a terminal.
+/// A progress bar on standard error: one line, redrawn a few times a second. Draws nothing unless standard
+/// error is a terminal.
 class ProgressBar : public ProgressSink {
   public:
     explicit ProgressBar(bool enabled);

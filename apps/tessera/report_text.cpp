@@ -9,9 +9,13 @@ namespace tessera {
 
 namespace {
 
-std::string place(const Vec3d& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z); }
+std::string place(const Vec3d& p) {
+    return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
+}
 
-std::string percent(double share) { return fmt::format("{:.3g} %", share * 100); }
+std::string percent(double share) {
+    return fmt::format("{:.3g} %", share * 100);
+}
 
 std::string rangeText(const std::vector<ValueRange>& ranges) {
     std::string text;
@@ -38,7 +42,8 @@ std::string formatTable(const std::vector<std::vector<std::string>>& rows) {
     for (const auto& row : rows) {
         std::string line;
         for (std::size_t c = 0; c < row.size(); ++c)
-            line += c == 0 ? fmt::format("  {:<{}}", row[c], widths[c]) : fmt::format("  {:>{}}", row[c], widths[c]);
+            line += c == 0 ? fmt::format("  {:<{}}", row[c], widths[c])
+                           : fmt::format("  {:>{}}", row[c], widths[c]);
         line.erase(line.find_last_not_of(' ') + 1);
         text += line + "\n";
     }
@@ -67,10 +72,10 @@ std::string formatBytes(std::int64_t bytes) {
 }
 
 std::string importText(const std::string& path, const ImportStatistics& s, const Box3d& bounds) {
-    std::string text = fmt::format("{}: {}, {} cells, {} elements, {} nodes\n", path, s.format, formatCount(s.cells),
-                                   formatCount(s.elements), formatCount(s.nodes));
-    text += fmt::format("  bounds {} to {}, edges {:.4g} to {:.4g}\n", place(bounds.min), place(bounds.max), s.smallestEdgeWorld,
-                        s.largestEdgeWorld);
+    std::string text = fmt::format("{}: {}, {} cells, {} elements, {} nodes\n", path, s.format,
+                                   formatCount(s.cells), formatCount(s.elements), formatCount(s.nodes));
+    text += fmt::format("  bounds {} to {}, edges {:.4g} to {:.4g}\n", place(bounds.min), place(bounds.max),
+                        s.smallestEdgeWorld, s.largestEdgeWorld);
     std::string oddities;
     appendCount(oddities, s.skippedCells, "other cells skipped");
     appendCount(oddities, s.blankedCells, "blanked cells left out");
@@ -87,7 +92,8 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
 std::string fieldsText(const std::vector<FieldSummary>& fields) {
     std::vector<std::vector<std::string>> rows{{"field", "on", "components", "range"}};
     for (const FieldSummary& f : fields)
-        rows.push_back({f.name, f.location == "point" ? "points" : "cells", std::to_string(f.ranges.size()), rangeText(f.ranges)});
+        rows.push_back({f.name, f.location == "point" ? "points" : "cells", std::to_string(f.ranges.size()),
+                        rangeText(f.ranges)});
     return formatTable(rows);
 }
 
@@ -101,44 +107,52 @@ std::string levelsText(const std::vector<LevelSummary>& levels) {
         all.storedPoints += l.storedPoints;
         all.coveredPoints += l.coveredPoints;
     }
-    rows.push_back({"all", "", formatCount(all.bricks), formatCount(all.storedPoints), formatCount(all.coveredPoints)});
+    rows.push_back(
+        {"all", "", formatCount(all.bricks), formatCount(all.storedPoints), formatCount(all.coveredPoints)});
     return formatTable(rows);
 }
 
 std::string errorText(const ErrorReport& report) {
-    std::vector<std::vector<std::string>> rows{{"error", "max", "of range", "99.9 %", "of range", "rms", "of range", "worst at"}};
+    std::vector<std::vector<std::string>> rows{
+        {"error", "max", "of range", "99.9 %", "of range", "rms", "of range", "worst at"}};
     for (const FieldError& f : report.fields) {
         const bool constant = f.range == 0;
         const auto share = [&](double value) { return constant ? std::string("-") : percent(value); };
-        rows.push_back({f.name, fmt::format("{:.4g}", f.max), share(f.relativeMax), fmt::format("{:.4g}", f.p999),
-                        share(f.relativeP999), fmt::format("{:.4g}", f.rms), share(f.relativeRms), place(f.worstPlaceWorld)});
+        rows.push_back({f.name, fmt::format("{:.4g}", f.max), share(f.relativeMax),
+                        fmt::format("{:.4g}", f.p999), share(f.relativeP999), fmt::format("{:.4g}", f.rms),
+                        share(f.relativeRms), place(f.worstPlaceWorld)});
     }
     std::string text = formatTable(rows);
-    text += fmt::format("  measured at {} nodes and {} centroids; {} of them in cells wholly inside the mesh\n",
-                        formatCount(report.nodes), formatCount(report.centroids), percent(report.fullyCoveredShare));
+    text += fmt::format(
+        "  measured at {} nodes and {} centroids; {} of them in cells wholly inside the mesh\n",
+        formatCount(report.nodes), formatCount(report.centroids), percent(report.fullyCoveredShare));
     for (const FieldError& f : report.fields) {
         if (f.skippedSamples > 0)
-            text += fmt::format("  {}: {} samples without a finite value were left out\n", f.name, formatCount(f.skippedSamples));
+            text += fmt::format("  {}: {} samples without a finite value were left out\n", f.name,
+                                formatCount(f.skippedSamples));
         if (f.validPoints < report.coveredPoints)
             text += fmt::format("  {}: {} voxels in the mesh have no finite value\n", f.name,
                                 formatCount(report.coveredPoints - f.validPoints));
     }
     if (report.outsideBricks > 0)
-        text += fmt::format("  {} samples lie outside the bounds and don't count\n", formatCount(report.outsideBricks));
+        text += fmt::format("  {} samples lie outside the bounds and don't count\n",
+                            formatCount(report.outsideBricks));
     return text;
 }
 
 std::string stagesText(const StageTimes& t) {
-    std::string text = fmt::format("  read {:.0f} ms, plan {:.0f} ms, resample {:.0f} ms, verify {:.0f} ms", t.readMs, t.planMs,
-                                   t.resampleMs, t.verifyMs);
+    std::string text = fmt::format("  read {:.0f} ms, plan {:.0f} ms, resample {:.0f} ms, verify {:.0f} ms",
+                                   t.readMs, t.planMs, t.resampleMs, t.verifyMs);
     if (t.extendMs > 0) text += fmt::format(", extend {:.0f} ms", t.extendMs);
     return text + fmt::format(", write {:.0f} ms\n", t.writeMs);
 }
 
 std::string estimateText(const PlanEstimate& e, double levelsMs, double flatMs) {
     std::string text = formatTable({{"layout", "voxels", "bytes", "predicted time"},
-                                    {"levels", formatCount(e.storedPoints), formatBytes(e.levelsBytes), fmt::format("{:.2g} s", levelsMs / 1000)},
-                                    {"flat", formatCount(e.flatPoints), formatBytes(e.flatBytes), fmt::format("{:.2g} s", flatMs / 1000)}});
+                                    {"levels", formatCount(e.storedPoints), formatBytes(e.levelsBytes),
+                                     fmt::format("{:.2g} s", levelsMs / 1000)},
+                                    {"flat", formatCount(e.flatPoints), formatBytes(e.flatBytes),
+                                     fmt::format("{:.2g} s", flatMs / 1000)}});
     std::string perLevel;
     for (std::size_t l = 0; l < e.bricksPerLevel.size(); ++l)
         perLevel += fmt::format("{}{} on level {}", l ? ", " : "", formatCount(e.bricksPerLevel[l]), l);

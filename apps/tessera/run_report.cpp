@@ -15,7 +15,9 @@ namespace tessera {
 
 namespace {
 
-Json vectorJson(const Vec3d& v) { return Json::array({v.x, v.y, v.z}); }
+Json vectorJson(const Vec3d& v) {
+    return Json::array({v.x, v.y, v.z});
+}
 
 Json rangeJson(const ValueRange& range) {
     return range.empty() ? Json(nullptr) : Json::array({range.min, range.max});
@@ -26,7 +28,10 @@ Json fieldsJson(const std::vector<FieldSummary>& fields) {
     for (const FieldSummary& field : fields) {
         Json ranges = Json::array();
         for (const ValueRange& range : field.ranges) ranges.push_back(rangeJson(range));
-        list.push_back({{"name", field.name}, {"location", field.location}, {"components", field.ranges.size()}, {"ranges", ranges}});
+        list.push_back({{"name", field.name},
+                        {"location", field.location},
+                        {"components", field.ranges.size()},
+                        {"ranges", ranges}});
     }
     return list;
 }
@@ -114,7 +119,10 @@ Json levelsJson(const BrickTree& tree, const std::vector<LevelSummary>& levels) 
               {"spacing_per_level", spacings}}},
             {"bricks", {{"total", tree.leafCount()}, {"per_level", bricks}}},
             {"voxels",
-             {{"total", allStored}, {"per_level", stored}, {"covered_total", allCovered}, {"covered_per_level", covered}}}};
+             {{"total", allStored},
+              {"per_level", stored},
+              {"covered_total", allCovered},
+              {"covered_per_level", covered}}}};
 }
 
 Json coverageJson(const ErrorReport& report) {
@@ -140,18 +148,27 @@ Json stagesJson(const StageTimes& t) {
 }
 
 Json statisticsJson(const ResampleStatistics& s) {
-    return {{"element_block_pairs", s.elementBlockPairs}, {"exact_elements", s.exactElements}, {"scanlines", s.scanlines},
-            {"contested_points", s.contested},            {"covered_points", s.coveredPoints}, {"bin_ms", s.binMs},
+    return {{"element_block_pairs", s.elementBlockPairs},
+            {"exact_elements", s.exactElements},
+            {"scanlines", s.scanlines},
+            {"contested_points", s.contested},
+            {"covered_points", s.coveredPoints},
+            {"bin_ms", s.binMs},
             {"sample_ms", s.sampleMs}};
 }
 
 Json writeResultJson(const VdbWriteResult& w) {
-    return {{"active_voxels", w.activeVoxels}, {"file_bytes", w.fileBytes}, {"flat_level", w.flatLevel},
-            {"unit_scale", w.unitScale},       {"notes", w.notes}};
+    return {{"active_voxels", w.activeVoxels},
+            {"file_bytes", w.fileBytes},
+            {"flat_level", w.flatLevel},
+            {"unit_scale", w.unitScale},
+            {"notes", w.notes}};
 }
 
 Json seriesJson(std::size_t steps, const Box3d& bounds, const std::vector<FieldSummary>& fields) {
-    return {{"steps", steps}, {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}}, {"fields", fieldsJson(fields)}};
+    return {{"steps", steps},
+            {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}},
+            {"fields", fieldsJson(fields)}};
 }
 
 Json estimateJson(const PlanEstimate& e, double levelsMs, double flatMs) {

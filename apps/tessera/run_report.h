@@ -25,19 +25,20 @@ struct LevelSummary {
     int level = 0;
     double spacingWorld = 0;
     std::int64_t bricks = 0;
-    std::int64_t storedPoints = 0;    ///< bricks x B^3
-    std::int64_t coveredPoints = 0;   ///< of these, in the mesh
+    std::int64_t storedPoints = 0;   ///< bricks x B^3
+    std::int64_t coveredPoints = 0;  ///< of these, in the mesh
 };
 std::vector<LevelSummary> summarizeLevels(const BrickTree& tree, const BrickStore& store);
 
 /// Finite range of one component of one field.
 struct FieldSummary {
     std::string name, location;
-    std::vector<ValueRange> ranges;   ///< one a component
+    std::vector<ValueRange> ranges;  ///< one a component
 };
 std::vector<FieldSummary> summarizeFields(const TetMesh& mesh);
 
-Json meshJson(const ImportStatistics& statistics, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
+Json meshJson(const ImportStatistics& statistics, const Box3d& boundsWorld,
+              const std::vector<FieldSummary>& fields);
 Json levelsJson(const BrickTree& tree, const std::vector<LevelSummary>& levels);
 /// Counts of covered points and of samples.
 Json coverageJson(const ErrorReport& report);
@@ -50,7 +51,8 @@ Json writeResultJson(const VdbWriteResult& written);
 Json seriesJson(std::size_t steps, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
 Json estimateJson(const PlanEstimate& estimate, double levelsMs, double flatMs);
 
-/// Writes the document to `path` (nothing stands there until it is whole), or to standard output for "-". Throws IoError.
+/// Writes the document to `path` (nothing stands there until it is whole), or to standard output for "-".
+/// Throws IoError.
 void writeJson(const std::string& path, const Json& document);
 
 }  // namespace tessera

@@ -12,10 +12,10 @@ namespace tessera {
 namespace {
 
 constexpr std::int64_t kElementChunk = 16384;
-constexpr double kDenseLimit = double(1 << 25);   // bricks of a dense grid of marks
+constexpr double kDenseLimit = double(1 << 25);  // bricks of a dense grid of marks
 
-// Keeps every brick whose samples a place inside the bounds can need: cell corners reach one voxel out, and those of the coarse cells that
-// a border is interpolated from twice that.
+// Keeps every brick whose samples a place inside the bounds can need: cell corners reach one voxel out, and
+// those of the coarse cells that a border is interpolated from twice that.
 bool insideBounds(const BrickKey& key, const PlanFrame& frame) {
     if (!frame.boundsWorld) return true;
     const double h = frame.spacingWorld(key.level);
@@ -23,8 +23,8 @@ bool insideBounds(const BrickKey& key, const PlanFrame& frame) {
     const Vec3d high = (frame.boundsWorld->max - frame.originWorld) / h + 2.0;
     const Vec3d first = Vec3d(key.index) * double(frame.brickCells);
     const Vec3d last = first + double(frame.brickCells);
-    return first.x <= high.x && first.y <= high.y && first.z <= high.z && last.x >= low.x && last.y >= low.y &&
-           last.z >= low.z;
+    return first.x <= high.x && first.y <= high.y && first.z <= high.z && last.x >= low.x &&
+           last.y >= low.y && last.z >= low.z;
 }
 
 // Bricks [min, max] whose touch boxes may meet a box in index space.
@@ -46,8 +46,10 @@ BrickRange clippedRange(const PlanFrame& frame, int depth) {
     Box3d box{(frame.meshBoundsWorld.min - frame.originWorld) * inverse,
               (frame.meshBoundsWorld.max - frame.originWorld) * inverse};
     if (frame.boundsWorld) {
-        box.min = glm::max(box.min, (frame.boundsWorld->min - frame.originWorld) * inverse - (2.0 + frame.brickCells));
-        box.max = glm::min(box.max, (frame.boundsWorld->max - frame.originWorld) * inverse + (2.0 + frame.brickCells));
+        box.min = glm::max(box.min,
+                           (frame.boundsWorld->min - frame.originWorld) * inverse - (2.0 + frame.brickCells));
+        box.max = glm::min(box.max,
+                           (frame.boundsWorld->max - frame.originWorld) * inverse + (2.0 + frame.brickCells));
     }
     return bricksMeeting(box, frame.brickCells);
 }
@@ -59,7 +61,9 @@ double rangeCount(const BrickRange& range) {
 
 }  // namespace
 
-double PlanFrame::spacingWorld(int depth) const { return std::ldexp(rootSpacingWorld, -depth); }
+double PlanFrame::spacingWorld(int depth) const {
+    return std::ldexp(rootSpacingWorld, -depth);
+}
 
 Box3d brickTouchBox(const BrickKey& key, int brickCells) {
     const Vec3d first = Vec3d(key.index) * double(brickCells);
@@ -164,7 +168,8 @@ void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick
         const Vec3d place = placeOfSample(sample) * inverse;
         std::size_t child = std::size_t((place.x >= middle.x ? 1 : 0) | (place.y >= middle.y ? 2 : 0) |
                                         (place.z >= middle.z ? 4 : 0));
-        // Rounding can put a sample just across the middle, where no element reaches: any child that touches it serves.
+        // Rounding can put a sample just across the middle, where no element reaches: any child that touches
+        // it serves.
         for (std::size_t other = 0; made[child].elements.empty() && other < 8; ++other)
             if (!made[other].elements.empty()) child = other;
         made[child].samples.push_back(sample);
@@ -190,7 +195,8 @@ std::vector<BrickKey> BrickPlan::unbalanced(const std::vector<BrickKey>& fresh) 
     std::vector<BrickKey> coarse;
     for (const BrickKey& key : fresh) {
         if (key.level < 2) continue;
-        // The parents of the 26 neighbours are at most eight bricks: per axis the own parent and the one on the nearer side.
+        // The parents of the 26 neighbours are at most eight bricks: per axis the own parent and the one on
+        // the nearer side.
         const Vec3i low{(key.index.x - 1) >> 1, (key.index.y - 1) >> 1, (key.index.z - 1) >> 1};
         for (int c = 0; c < 8; ++c) {
             BrickKey parent{key.level - 1, low + Vec3i(c & 1, (c >> 1) & 1, c >> 2)};
@@ -205,7 +211,8 @@ std::vector<BrickKey> BrickPlan::unbalanced(const std::vector<BrickKey>& fresh) 
         }
     }
     std::sort(coarse.begin(), coarse.end(), [](const BrickKey& a, const BrickKey& b) {
-        return std::tie(a.level, a.index.z, a.index.y, a.index.x) < std::tie(b.level, b.index.z, b.index.y, b.index.x);
+        return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
+               std::tie(b.level, b.index.z, b.index.y, b.index.x);
     });
     coarse.erase(std::unique(coarse.begin(), coarse.end()), coarse.end());
     return coarse;
@@ -247,7 +254,8 @@ bool BrickPlan::split(const std::vector<BrickKey>& keys, std::size_t maxLeaves, 
         // A split can unbalance others, and a brick stays a cause until its neighbours are fine enough.
         pending = unbalanced(fresh);
     }
-    for (const std::int64_t slot : splitSlots_) bricks_[std::size_t(slot)] = PlannedBrick{{-1, {}}, {}, {}, false, -1, 0};
+    for (const std::int64_t slot : splitSlots_)
+        bricks_[std::size_t(slot)] = PlannedBrick{{-1, {}}, {}, {}, false, -1, 0};
     std::erase_if(bricks_, [](const PlannedBrick& brick) { return brick.key.level < 0; });
     for (std::size_t i = 0; i < bricks_.size(); ++i) at_[bricks_[i].key] = std::int64_t(i);
     return true;
@@ -301,12 +309,14 @@ BrickRange elementRange(const TetMesh& mesh, const std::vector<NodeBrick>& nodes
 class BrickMarks {
   public:
     explicit BrickMarks(const BrickRange& range)
-        : range_(range), size_(range.max - range.min + 1),
+        : range_(range),
+          size_(range.max - range.min + 1),
           marks_(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z), 0) {}
     std::atomic_ref<std::uint8_t> at(int x, int y, int z) {
-        return std::atomic_ref<std::uint8_t>(marks_[(std::size_t(z - range_.min.z) * std::size_t(size_.y) +
-                                                     std::size_t(y - range_.min.y)) * std::size_t(size_.x) +
-                                                    std::size_t(x - range_.min.x)]);
+        return std::atomic_ref<std::uint8_t>(
+            marks_[(std::size_t(z - range_.min.z) * std::size_t(size_.y) + std::size_t(y - range_.min.y)) *
+                       std::size_t(size_.x) +
+                   std::size_t(x - range_.min.x)]);
     }
     std::int64_t count() const {
         std::int64_t sum = 0;
@@ -330,25 +340,29 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
     BrickMarks marks(range);
     const double spacing = frame.spacingWorld(depth);
     const std::vector<NodeBrick> nodes = nodeBricks(mesh, frame, execution);
-    parallelForChunks(execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
-        std::optional<ElementOverlap> element;
-        for (std::int64_t e = begin; e < end; ++e) {
-            const BrickRange own = elementRange(mesh, nodes, e);
-            const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
-            element.reset();
-            for (int z = low.z; z <= high.z; ++z)
-                for (int y = low.y; y <= high.y; ++y)
-                    for (int x = low.x; x <= high.x; ++x) {
-                        // Most bricks are marked already by an earlier element: the exact test runs rarely.
-                        auto mark = marks.at(x, y, z);
-                        if (mark.load(std::memory_order_relaxed)) continue;
-                        if (!element) element.emplace(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
-                        const BrickKey key{depth, {x, y, z}};
-                        if (element->touches(brickTouchBox(key, frame.brickCells)) && insideBounds(key, frame))
-                            mark.store(1, std::memory_order_relaxed);
-                    }
-        }
-    });
+    parallelForChunks(
+        execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+            std::optional<ElementOverlap> element;
+            for (std::int64_t e = begin; e < end; ++e) {
+                const BrickRange own = elementRange(mesh, nodes, e);
+                const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
+                element.reset();
+                for (int z = low.z; z <= high.z; ++z)
+                    for (int y = low.y; y <= high.y; ++y)
+                        for (int x = low.x; x <= high.x; ++x) {
+                            // Most bricks are marked already by an earlier element: the exact test runs
+                            // rarely.
+                            auto mark = marks.at(x, y, z);
+                            if (mark.load(std::memory_order_relaxed)) continue;
+                            if (!element)
+                                element.emplace(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
+                            const BrickKey key{depth, {x, y, z}};
+                            if (element->touches(brickTouchBox(key, frame.brickCells)) &&
+                                insideBounds(key, frame))
+                                mark.store(1, std::memory_order_relaxed);
+                        }
+            }
+        });
     const std::int64_t count = marks.count();
     if (!keys || count > limit) return count;
     keys->reserve(std::size_t(count));

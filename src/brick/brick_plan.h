@@ -13,12 +13,13 @@
 
 namespace tessera {
 
-/// Where the nested lattices stand. While a tree grows bricks are counted by depth: spacing rootSpacing / 2^depth, exact in binary,
-/// and all lattices share the origin, so whatever depth turns out to be the finest, the levels nest.
+/// Where the nested lattices stand. While a tree grows bricks are counted by depth: spacing rootSpacing /
+/// 2^depth, exact in binary, and all lattices share the origin, so whatever depth turns out to be the finest,
+/// the levels nest.
 struct PlanFrame {
     Vec3d originWorld{0};
     double rootSpacingWorld = 1;
-    int maxDepth = 0;            ///< the finest spacing allowed is that of this depth
+    int maxDepth = 0;  ///< the finest spacing allowed is that of this depth
     int brickCells = 16;
     std::optional<Box3d> boundsWorld;
     Box3d meshBoundsWorld;
@@ -28,11 +29,11 @@ struct PlanFrame {
 /// One leaf of a growing tree. In `key` the level is the depth (0: coarsest).
 struct PlannedBrick {
     BrickKey key;
-    std::vector<std::int32_t> elements;   ///< that touch the brick, ascending
-    std::vector<std::uint32_t> samples;   ///< error-driven: samples inside the brick, ascending
-    bool sampled = false;                 ///< error-driven: its values are in the store
-    std::int64_t storeLeaf = -1;          ///< error-driven: where
-    double ratio = 0;                     ///< error-driven: what refinement goes by
+    std::vector<std::int32_t> elements;  ///< that touch the brick, ascending
+    std::vector<std::uint32_t> samples;  ///< error-driven: samples inside the brick, ascending
+    bool sampled = false;                ///< error-driven: its values are in the store
+    std::int64_t storeLeaf = -1;         ///< error-driven: where
+    double ratio = 0;                    ///< error-driven: what refinement goes by
 };
 
 /// The growing tree: leaves over the elements, split on demand, kept 2:1 balanced.
@@ -47,8 +48,9 @@ class BrickPlan {
     std::vector<PlannedBrick*> leaves();
     int deepest() const;
 
-    /// Splits these leaves, and coarser neighbours until the tree is balanced again; children without elements are dropped. When more than
-    /// maxLeaves would stand, leaves everything as it was and returns false.
+    /// Splits these leaves, and coarser neighbours until the tree is balanced again; children without
+    /// elements are dropped. When more than maxLeaves would stand, leaves everything as it was and returns
+    /// false.
     bool split(const std::vector<BrickKey>& keys, std::size_t maxLeaves, const Execution& execution);
 
     /// Level 0 is the deepest depth present, or `finestDepth` when given (>= 0).
@@ -70,8 +72,8 @@ class BrickPlan {
 
     const TetMesh* mesh_;
     PlanFrame frame_;
-    std::vector<PlannedBrick> bricks_;                               // leaves, and slots of bricks that were split
-    std::unordered_map<BrickKey, std::int64_t, BrickKeyHash> at_;    // position in bricks_, or kInner
+    std::vector<PlannedBrick> bricks_;  // leaves, and slots of bricks that were split
+    std::unordered_map<BrickKey, std::int64_t, BrickKeyHash> at_;  // position in bricks_, or kInner
     std::size_t leafCount_ = 0;
     // What the running split() did, for undo(): slots split, keys made.
     std::vector<std::int64_t> splitSlots_;
@@ -85,9 +87,10 @@ Box3d brickTouchBox(const BrickKey& key, int brickCells);
 std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
                                          double spacingWorld);
 
-/// Number of bricks of depth frame.maxDepth that elements touch (and their keys, level 0, when `keys` isn't null and there are at most
-/// `limit`); -1 when the box of bricks is too large for a dense grid of marks. For single-level trees: no element lists.
-std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit, std::vector<BrickKey>* keys,
-                           const Execution& execution);
+/// Number of bricks of depth frame.maxDepth that elements touch (and their keys, level 0, when `keys` isn't
+/// null and there are at most `limit`); -1 when the box of bricks is too large for a dense grid of marks. For
+/// single-level trees: no element lists.
+std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit,
+                           std::vector<BrickKey>* keys, const Execution& execution);
 
 }  // namespace tessera

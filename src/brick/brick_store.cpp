@@ -8,7 +8,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::uint64_t kRowCovered = 0x0101010101010101ull;   // eight coverage bytes, all 1
+constexpr std::uint64_t kRowCovered = 0x0101010101010101ull;  // eight coverage bytes, all 1
 
 // Coverage of a tile as seen in a block: rows of eight bytes along x.
 enum class TileCover { none, some, all };
@@ -16,7 +16,7 @@ enum class TileCover { none, some, all };
 TileCover readCoverage(const std::uint8_t* first, std::size_t rowStride, std::size_t layerStride,
                        std::array<std::uint64_t, 8>& bits) {
     std::uint64_t any = 0, all = kRowCovered;
-    std::array<std::uint64_t, 64> rows;   // [y * 8 + z]
+    std::array<std::uint64_t, 64> rows;  // [y * 8 + z]
     for (std::size_t z = 0; z < 8; ++z)
         for (std::size_t y = 0; y < 8; ++y) {
             std::uint64_t row;
@@ -53,10 +53,13 @@ void clearUncovered(const std::array<std::uint64_t, 8>& bits, float* tile) {
 
 std::size_t tileOf(const Vec3i& local, int tilesPerEdge) {
     return (std::size_t(local.x >> 3) * std::size_t(tilesPerEdge) + std::size_t(local.y >> 3)) *
-               std::size_t(tilesPerEdge) + std::size_t(local.z >> 3);
+               std::size_t(tilesPerEdge) +
+           std::size_t(local.z >> 3);
 }
 
-int offsetOf(const Vec3i& local) { return ((local.x & 7) * 8 + (local.y & 7)) * 8 + (local.z & 7); }
+int offsetOf(const Vec3i& local) {
+    return ((local.x & 7) * 8 + (local.y & 7)) * 8 + (local.z & 7);
+}
 
 }  // namespace
 
@@ -73,7 +76,8 @@ void BrickStore::put(std::size_t leaf, const BrickKey& key, const Block& block) 
     TESSERA_CHECK(leaf < leafCount_ && block.channels == channels_, "a block for this store");
     const int cells = tilesPerEdge_ * kTileSize;
     const Vec3i first = key.index * cells;
-    TESSERA_CHECK(block.box.contains(first) && block.box.contains(first + (cells - 1)), "the block holds the brick");
+    TESSERA_CHECK(block.box.contains(first) && block.box.contains(first + (cells - 1)),
+                  "the block holds the brick");
     const Vec3i size = block.box.size();
     const std::size_t rowStride = std::size_t(size.x);
     const std::size_t layerStride = rowStride * std::size_t(size.y);
@@ -83,14 +87,16 @@ void BrickStore::put(std::size_t leaf, const BrickKey& key, const Block& block) 
         for (int y = 0; y < cells; y += kTileSize)
             for (int z = 0; z < cells; z += kTileSize, ++t) {
                 const std::size_t at = block.offset(first + Vec3i(x, y, z));
-                const TileCover cover = readCoverage(block.coverage.data() + at, rowStride, layerStride, bits);
+                const TileCover cover =
+                    readCoverage(block.coverage.data() + at, rowStride, layerStride, bits);
                 if (cover == TileCover::none) continue;
                 auto tile = std::make_unique<Tile>();
                 tile->coverage = bits;
                 tile->values = std::make_unique_for_overwrite<float[]>(std::size_t(channels_) * kTilePoints);
                 for (int c = 0; c < channels_; ++c) {
                     float* values = tile->values.get() + std::size_t(c) * kTilePoints;
-                    copyValues(block.values.data() + std::size_t(c) * block.count() + at, rowStride, layerStride, values);
+                    copyValues(block.values.data() + std::size_t(c) * block.count() + at, rowStride,
+                               layerStride, values);
                     if (cover == TileCover::some) clearUncovered(bits, values);
                 }
                 tiles_[t] = std::move(tile);

@@ -10,7 +10,8 @@
 namespace tessera {
 
 std::size_t BrickKeyHash::operator()(const BrickKey& key) const {
-    // Multiplicative mixing of the four integers; the last shift brings the high bits down to where tables look.
+    // Multiplicative mixing of the four integers; the last shift brings the high bits down to where tables
+    // look.
     std::uint64_t h = std::uint64_t(std::uint32_t(key.level)) * 0x9e3779b97f4a7c15ull;
     for (const int v : {key.index.x, key.index.y, key.index.z})
         h = (h ^ std::uint64_t(std::uint32_t(v))) * 0x9fb21c651e98df25ull, h ^= h >> 29;
@@ -20,7 +21,8 @@ std::size_t BrickKeyHash::operator()(const BrickKey& key) const {
 namespace {
 
 bool storageOrder(const BrickKey& a, const BrickKey& b) {
-    return std::tie(a.level, a.index.z, a.index.y, a.index.x) < std::tie(b.level, b.index.z, b.index.y, b.index.x);
+    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
+           std::tie(b.level, b.index.z, b.index.y, b.index.x);
 }
 
 // Arithmetic shifts round towards minus infinity, as floor division by a power of two does.
@@ -35,9 +37,11 @@ std::size_t childOf(const Vec3i& index) {
 
 }  // namespace
 
-BrickTree::BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells, std::vector<BrickKey> leaves)
+BrickTree::BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells,
+                     std::vector<BrickKey> leaves)
     : origin_(originWorld), spacing_(spacingWorld), brickCells_(brickCells), leaves_(std::move(leaves)) {
-    TESSERA_CHECK(brickCells > 0 && std::has_single_bit(unsigned(brickCells)), "a brick has a power of two of cells");
+    TESSERA_CHECK(brickCells > 0 && std::has_single_bit(unsigned(brickCells)),
+                  "a brick has a power of two of cells");
     TESSERA_CHECK(spacingWorld > 0, "a brick tree needs a spacing");
     std::sort(leaves_.begin(), leaves_.end(), storageOrder);
     if (leaves_.empty()) return;
@@ -82,7 +86,8 @@ std::int32_t& BrickTree::rootSlot(const Vec3i& index) {
     if (denseRoots_.empty()) return sparseRoots_.try_emplace(BrickKey{0, index}, kAbsent).first->second;
     const Vec3i q = index - rootMin_;
     return denseRoots_[(std::size_t(q.z) * std::size_t(rootSize_.y) + std::size_t(q.y)) *
-                           std::size_t(rootSize_.x) + std::size_t(q.x)];
+                           std::size_t(rootSize_.x) +
+                       std::size_t(q.x)];
 }
 
 void BrickTree::insert(std::int32_t leaf) {
@@ -105,9 +110,13 @@ void BrickTree::insert(std::int32_t leaf) {
     *slot = leaf;
 }
 
-double BrickTree::spacingWorld(int level) const { return std::ldexp(spacing_, level); }
+double BrickTree::spacingWorld(int level) const {
+    return std::ldexp(spacing_, level);
+}
 
-Lattice BrickTree::lattice(int level) const { return Lattice::axisParallel(origin_, spacingWorld(level)); }
+Lattice BrickTree::lattice(int level) const {
+    return Lattice::axisParallel(origin_, spacingWorld(level));
+}
 
 IndexBox BrickTree::ownedPoints(const BrickKey& key) const {
     return {key.index * brickCells_, key.index * brickCells_ + brickCells_};
@@ -152,14 +161,16 @@ bool BrickTree::isRefined(const BrickKey& key) const {
 std::int64_t BrickTree::findLeafAt(const Vec3d& index0) const {
     const Vec3d floored = glm::floor(index0);
     constexpr double kLimit = 2147483647.0;
-    if (!(std::abs(floored.x) < kLimit && std::abs(floored.y) < kLimit && std::abs(floored.z) < kLimit)) return -1;
+    if (!(std::abs(floored.x) < kLimit && std::abs(floored.y) < kLimit && std::abs(floored.z) < kLimit))
+        return -1;
     return findLeafAt(0, Vec3i(floored));
 }
 
 std::int64_t BrickTree::findLeafAt(int level, const Vec3i& p) const {
     if (levelCount_ == 0) return -1;
     // 64 bits: a coarse lattice's far corner, counted in points of level 0, may pass 2^31.
-    const std::int64_t x = std::int64_t(p.x) << level, y = std::int64_t(p.y) << level, z = std::int64_t(p.z) << level;
+    const std::int64_t x = std::int64_t(p.x) << level, y = std::int64_t(p.y) << level,
+                       z = std::int64_t(p.z) << level;
     const int shift = std::countr_zero(unsigned(brickCells_));
     const auto brickAt = [&](int l) {
         return Vec3i(int(x >> (shift + l)), int(y >> (shift + l)), int(z >> (shift + l)));

@@ -10,9 +10,10 @@
 
 namespace tessera {
 
-/// A brick of brickCells^3 cells of one level. It owns the lattice points [index * B, index * B + B) of that level (half-open); its closed box has
-/// B + 1 points along each axis. Level 0 is the finest; level l + 1 has every second lattice point of level l, so
-/// brick (l, b) is the union of the eight bricks (l - 1, 2 b + {0, 1}).
+/// A brick of brickCells^3 cells of one level. It owns the lattice points [index * B, index * B + B) of that
+/// level (half-open); its closed box has B + 1 points along each axis. Level 0 is the finest; level l + 1 has
+/// every second lattice point of level l, so brick (l, b) is the union of the eight bricks (l - 1, 2 b + {0,
+/// 1}).
 struct BrickKey {
     int level = 0;
     Vec3i index{0};
@@ -23,13 +24,13 @@ struct BrickKeyHash {
     std::size_t operator()(const BrickKey& key) const;
 };
 
-/// The leaf bricks over a mesh: disjoint, and any two whose closed boxes touch (26 neighbours) differ by at most one level. Space
-/// that no element touches has no brick.
+/// The leaf bricks over a mesh: disjoint, and any two whose closed boxes touch (26 neighbours) differ by at
+/// most one level. Space that no element touches has no brick.
 class BrickTree {
   public:
     BrickTree() = default;
-    /// @param spacingWorld h_0, the spacing of level 0. @param leaves in any order; stored ascending by level, z, y, x.
-    /// Throws InternalError when leaves overlap.
+    /// @param spacingWorld h_0, the spacing of level 0. @param leaves in any order; stored ascending by
+    /// level, z, y, x. Throws InternalError when leaves overlap.
     BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells, std::vector<BrickKey> leaves);
 
     const Vec3d& originWorld() const { return origin_; }
@@ -56,8 +57,8 @@ class BrickTree {
     std::int64_t findLeafAt(int level, const Vec3i& p) const;
 
   private:
-    // Children of an inner brick, child (x & 1) | (y & 1) << 1 | (z & 1) << 2. An entry is a leaf's position, kAbsent, or an inner
-    // brick coded as innerEntry(position in inner_).
+    // Children of an inner brick, child (x & 1) | (y & 1) << 1 | (z & 1) << 2. An entry is a leaf's position,
+    // kAbsent, or an inner brick coded as innerEntry(position in inner_).
     using Children = std::array<std::int32_t, 8>;
     static constexpr std::int32_t kAbsent = -1;
     static constexpr std::int32_t innerEntry(std::size_t position) { return -2 - std::int32_t(position); }
@@ -76,7 +77,8 @@ class BrickTree {
     int levelCount_ = 0;
     std::vector<BrickKey> leaves_;
     std::vector<Children> inner_;
-    // Bricks of the coarsest level present: a dense grid over their box, or a map when that would be mostly empty.
+    // Bricks of the coarsest level present: a dense grid over their box, or a map when that would be mostly
+    // empty.
     Vec3i rootMin_{0};
     Vec3i rootSize_{0};
     std::vector<std::int32_t> denseRoots_;

@@ -28,8 +28,9 @@ SampledField describe(const Field& field, int firstChannel) {
 }  // namespace
 
 ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
-    : mesh_(&mesh), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
-    TESSERA_CHECK(mesh.points.size() + mesh.tets.size() < (std::size_t(1) << 32), "samples are counted in 32 bits");
+    : mesh_(&mesh), centroid_(mesh.tets.size()), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
+    TESSERA_CHECK(mesh.points.size() + mesh.tets.size() < (std::size_t(1) << 32),
+                  "samples are counted in 32 bits");
     fields_.resize(fields.size());
     for (std::size_t f = 0; f < fields.size(); ++f) {
         fields_[f].firstChannel = channels_;
@@ -39,19 +40,24 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
         fields_[std::size_t(f)] =
             describe(mesh.fields[std::size_t(fields[std::size_t(f)])], fields_[std::size_t(f)].firstChannel);
     });
+    if (!mesh.points.empty()) reference_ = mesh.points[0];
     std::atomic<std::int64_t> flat{0}, inverted{0};
     parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
         std::int64_t chunkFlat = 0, chunkInverted = 0;
         for (std::int64_t e = begin; e < end; ++e) {
             const auto& tet = mesh.tets[std::size_t(e)];
-            const int sign = volumeSign(mesh.points[std::size_t(tet[0])], mesh.points[std::size_t(tet[1])],
-                                        mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]);
+            const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
+                        &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
+            const int sign = volumeSign(a, b, c, d);
             chunkFlat += sign == 0;
             chunkInverted += sign < 0;
             if (sign == 0) continue;
+            const double sixfold = glm::dot(glm::cross(b - a, c - a), d - a);
             // A volume that underflows or cancels to 0 in double still belongs to an element that is there.
             volume_[std::size_t(e)] =
-                std::max(std::abs(signedVolume(mesh, e)), std::numeric_limits<double>::denorm_min());
+                std::max(std::abs(sixfold) / 6, std::numeric_limits<double>::denorm_min());
+            centroid_[std::size_t(e)] =
+                0.25 * (((a - reference_) + (b - reference_)) + ((c - reference_) + (d - reference_)));
             for (const std::int32_t node : tet) {
                 std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
                 if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
@@ -64,14 +70,7 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
     inverted_ = inverted;
 }
 
-Vec3d ErrorSamples::placeWorld(std::size_t sample, const Vec3d& originWorld) const {
-    const auto& points = mesh_->points;
-    if (sample < usedNode_.size()) return points[sample] - originWorld;
-    const auto& tet = mesh_->tets[sample - usedNode_.size()];
-    return 0.25 * ((points[std::size_t(tet[0])] - originWorld) + (points[std::size_t(tet[1])] - originWorld) +
-                   (points[std::size_t(tet[2])] - originWorld) + (points[std::size_t(tet[3])] - originWorld));
-}
-
+// A cell's value, a node's value, or the mean of an element's four.
 double ErrorSamples::exactValue(std::size_t sample, const Field& field, int component) const {
     if (sample < usedNode_.size()) return field.at(std::int64_t(sample), component);
     const std::size_t element = sample - usedNode_.size();
@@ -106,20 +105,22 @@ bool contains(const Box3d& box, const Vec3d& p) {
 
 }  // namespace
 
-SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree, const std::optional<Box3d>& boundsWorld,
-                          const Execution& execution) {
+SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
+                          const std::optional<Box3d>& boundsWorld, const Execution& execution) {
     std::vector<std::int32_t> leafOf(samples.count(), kNoSample);
     const double inverse = 1.0 / tree.spacingWorld(0);
     const Vec3d origin = tree.originWorld();
     std::optional<Box3d> bounds;
     if (boundsWorld) bounds = Box3d{boundsWorld->min - origin, boundsWorld->max - origin};
-    parallelForChunks(execution, std::int64_t(samples.count()), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t s = begin; s < end; ++s) {
-            if (!samples.exists(std::size_t(s))) continue;
-            const Vec3d place = samples.placeWorld(std::size_t(s), origin);
-            leafOf[std::size_t(s)] = bounds && !contains(*bounds, place) ? kOutside : leafOfPlace(tree, place * inverse);
-        }
-    });
+    parallelForChunks(
+        execution, std::int64_t(samples.count()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+            for (std::int64_t s = begin; s < end; ++s) {
+                if (!samples.exists(std::size_t(s))) continue;
+                const Vec3d place = samples.placeWorld(std::size_t(s), origin);
+                leafOf[std::size_t(s)] =
+                    bounds && !contains(*bounds, place) ? kOutside : leafOfPlace(tree, place * inverse);
+            }
+        });
     SamplesByLeaf sorted;
     sorted.first.assign(tree.leafCount() + 1, 0);
     for (const std::int32_t leaf : leafOf) {
@@ -141,7 +142,9 @@ LeafSampler::LeafSampler(const ErrorSamples& samples, const BrickTree& tree, con
       store_(&store),
       reconstruction_(&reconstruction),
       values_(std::size_t(store.channels())),
-      slotOf_(std::size_t(tree.brickCells() + 1) * std::size_t(tree.brickCells() + 1) * std::size_t(tree.brickCells() + 1), -1) {}
+      slotOf_(std::size_t(tree.brickCells() + 1) * std::size_t(tree.brickCells() + 1) *
+                  std::size_t(tree.brickCells() + 1),
+              -1) {}
 
 void LeafSampler::enter(std::size_t leaf) {
     leaf_ = leaf;
@@ -188,9 +191,8 @@ bool LeafSampler::reconstructSlowly(const CellPlace& place) {
             slot = std::int32_t(slotCovered_.size());
             touched_.push_back((p.z * edge + p.y) * edge + p.x);
             slotValues_.resize(slotValues_.size() + channels);
-            slotCovered_.push_back(reconstruction_->resolve(
-                tree_->leaves()[leaf_].level, firstPoint_ + p, 0,
-                std::span(slotValues_).last(channels)));
+            slotCovered_.push_back(reconstruction_->resolve(tree_->leaves()[leaf_].level, firstPoint_ + p, 0,
+                                                            std::span(slotValues_).last(channels)));
         }
         covered &= slotCovered_[std::size_t(slot)] != 0;
         const double* corner = slotValues_.data() + std::size_t(slot) * channels;
@@ -231,16 +233,18 @@ bool LeafSampler::measure(std::size_t sample, std::span<double> errors) {
     const Vec3i& cell = place.cell;
     const int low = coarserNear_ ? 1 : 0;
     Corners corners;
-    if (cell.x >= low && cell.y >= low && cell.z >= low && cell.x + 1 < b && cell.y + 1 < b && cell.z + 1 < b &&
-        readCorners(cell, corners)) {
+    if (cell.x >= low && cell.y >= low && cell.z >= low && cell.x + 1 < b && cell.y + 1 < b &&
+        cell.z + 1 < b && readCorners(cell, corners)) {
         double weights[8];
         for (int c = 0; c < 8; ++c) weights[c] = cornerWeight(place.fraction, c);
         for (std::size_t v = 0; v < values_.size(); ++v) {
             double sum = 0;
-            for (int c = 0; c < 8; ++c) sum += weights[c] * double(corners.tile[c]->channel(int(v))[corners.offset[c]]);
+            for (int c = 0; c < 8; ++c)
+                sum += weights[c] * double(corners.tile[c]->channel(int(v))[corners.offset[c]]);
             values_[v] = sum;
         }
-        // A value that isn't finite may have come from a corner of weight zero: the slow way leaves those out.
+        // A value that isn't finite may have come from a corner of weight zero: the slow way leaves those
+        // out.
         if (fieldErrors(sample, errors)) return true;
     }
     const bool covered = reconstructSlowly(place);

@@ -12,10 +12,12 @@ namespace tessera {
 namespace {
 
 bool ascending(const BrickKey& a, const BrickKey& b) {
-    return std::tie(a.level, a.index.z, a.index.y, a.index.x) < std::tie(b.level, b.index.z, b.index.y, b.index.x);
+    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
+           std::tie(b.level, b.index.z, b.index.y, b.index.x);
 }
 
-// Bricks that new points may lie in: the leaves, and what lies next to a leaf of the level and isn't a coarser leaf's.
+// Bricks that new points may lie in: the leaves, and what lies next to a leaf of the level and isn't a
+// coarser leaf's.
 std::vector<BrickKey> targetBricks(const BrickTree& tree) {
     std::unordered_set<BrickKey, BrickKeyHash> keys;
     for (const BrickKey& leaf : tree.leaves())
@@ -34,7 +36,9 @@ std::vector<BrickKey> targetBricks(const BrickTree& tree) {
 class CoverageWindow {
   public:
     CoverageWindow(const BrickTree& tree, const BrickStore& store, const BrickKey& key, int layers)
-        : layers_(layers), edge_(tree.brickCells() + 2 * layers), marks_(std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_), 0) {
+        : layers_(layers),
+          edge_(tree.brickCells() + 2 * layers),
+          marks_(std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_), 0) {
         for (int n = 0; n < 27; ++n) {
             const Vec3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
             const std::int64_t leaf = tree.findLeaf({key.level, key.index + step});
@@ -62,7 +66,8 @@ class CoverageWindow {
 
   private:
     std::size_t at(const Vec3i& p) const {
-        return (std::size_t(p.z) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) + std::size_t(p.x);
+        return (std::size_t(p.z) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) +
+               std::size_t(p.x);
     }
     void copy(const BrickStore& store, std::size_t leaf, const Vec3i& offset, int brickCells) {
         const Vec3i low = glm::max(Vec3i(0), -offset - layers_);
@@ -95,7 +100,8 @@ bool fullyCovered(const BrickStore& store, std::size_t leaf) {
 }
 
 // New points of one brick, in order.
-std::vector<Vec3i> newPoints(const BrickTree& tree, const BrickStore& store, const BrickKey& key, int layers) {
+std::vector<Vec3i> newPoints(const BrickTree& tree, const BrickStore& store, const BrickKey& key,
+                             int layers) {
     std::vector<Vec3i> points;
     const std::int64_t leaf = tree.findLeaf(key);
     if (leaf >= 0 && fullyCovered(store, std::size_t(leaf))) return points;
@@ -111,7 +117,7 @@ std::vector<Vec3i> newPoints(const BrickTree& tree, const BrickStore& store, con
                 const Vec3i local(x, y, z);
                 if (!grown.covered(local) || window.covered(local)) continue;
                 const Vec3i p = key.index * b + local;
-                if (shared && tree.findLeafAt(key.level, p) >= 0) continue;   // a finer leaf's own
+                if (shared && tree.findLeafAt(key.level, p) >= 0) continue;  // a finer leaf's own
                 points.push_back(p);
             }
     return points;
@@ -123,7 +129,8 @@ ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, 
                               const BrickStore& store, const NearestPointIndex& nearest, int layers,
                               const Execution& execution) {
     if (layers < 0 || layers > tree.brickCells())
-        throw InputError("the number of layers outside the mesh must be 0 to the brick size, not " + std::to_string(layers));
+        throw InputError("the number of layers outside the mesh must be 0 to the brick size, not " +
+                         std::to_string(layers));
     ExtensionPoints result;
     if (layers == 0) return result;
     const std::vector<BrickKey> targets = targetBricks(tree);
@@ -133,29 +140,33 @@ ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, 
     });
     for (std::size_t t = 0; t < targets.size(); ++t)
         for (const Vec3i& p : points[t]) result.points.push_back({p, targets[t].level, 0});
-    std::sort(result.points.begin(), result.points.end(), [](const ExtensionPoint& a, const ExtensionPoint& b) {
-        return ascending({a.level, a.index}, {b.level, b.index});
-    });
+    std::sort(result.points.begin(), result.points.end(),
+              [](const ExtensionPoint& a, const ExtensionPoint& b) {
+                  return ascending({a.level, a.index}, {b.level, b.index});
+              });
 
     const std::size_t channels = std::size_t(store.channels());
-    TESSERA_CHECK(result.points.size() * channels < (std::size_t(1) << 32), "extension values are counted in 32 bits");
+    TESSERA_CHECK(result.points.size() * channels < (std::size_t(1) << 32),
+                  "extension values are counted in 32 bits");
     result.values.resize(result.points.size() * channels);
-    parallelForChunks(execution, std::int64_t(result.points.size()), 256, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t i = begin; i < end; ++i) {
-            ExtensionPoint& point = result.points[std::size_t(i)];
-            const double h = tree.spacingWorld(point.level);
-            const Vec3d place = tree.lattice(point.level).worldFromIndex(Vec3d(point.index));
-            // Within `layers` steps along every axis of a covered point: a diagonal at most, and room for rounding.
-            const NearestPoint found = nearest.find(place, 2.0 * (layers + 1) * h);
-            std::size_t at = std::size_t(i) * channels;
-            point.firstValue = std::uint32_t(at);
-            for (const int f : fields) {
-                const Field& field = mesh.fields[std::size_t(f)];
-                for (int c = 0; c < field.components; ++c)
-                    result.values[at++] = found.element < 0 ? 0.0f : float(found.value(field, c));
+    parallelForChunks(
+        execution, std::int64_t(result.points.size()), 256, [&](std::int64_t begin, std::int64_t end) {
+            for (std::int64_t i = begin; i < end; ++i) {
+                ExtensionPoint& point = result.points[std::size_t(i)];
+                const double h = tree.spacingWorld(point.level);
+                const Vec3d place = tree.lattice(point.level).worldFromIndex(Vec3d(point.index));
+                // Within `layers` steps along every axis of a covered point: a diagonal at most, and room for
+                // rounding.
+                const NearestPoint found = nearest.find(place, 2.0 * (layers + 1) * h);
+                std::size_t at = std::size_t(i) * channels;
+                point.firstValue = std::uint32_t(at);
+                for (const int f : fields) {
+                    const Field& field = mesh.fields[std::size_t(f)];
+                    for (int c = 0; c < field.components; ++c)
+                        result.values[at++] = found.element < 0 ? 0.0f : float(found.value(field, c));
+                }
             }
-        }
-    });
+        });
     return result;
 }
 

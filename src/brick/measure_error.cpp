@@ -29,15 +29,18 @@ struct Worst {
     }
 };
 
-// Errors of every sample, one list a field, as floats in units of the field's range: NaN where skipped, -1 where there is no sample.
+// Errors of every sample, one list a field, as floats in units of the field's range: NaN where skipped, -1
+// where there is no sample.
 using ErrorLists = std::vector<std::vector<float>>;
 
 struct SampleTotals {
-    std::vector<Worst> worst;         // one a field
+    std::vector<Worst> worst;  // one a field
     std::int64_t fullyCovered = 0;
 };
 
-double unitOf(const SampledField& field) { return field.range > 0 ? field.range : 1; }
+double unitOf(const SampledField& field) {
+    return field.range > 0 ? field.range : 1;
+}
 
 SampleTotals measureSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, const BrickTree& tree,
                             const BrickStore& store, const Reconstruction& reconstruction, ErrorLists& lists,
@@ -61,7 +64,8 @@ SampleTotals measureSamples(const ErrorSamples& samples, const SamplesByLeaf& so
                     const double unit = unitOf(samples.fields()[f]);
                     lists[f][sample] = errors[f] < 0 ? -1.0f : float(errors[f] / unit);
                     total.worst[f].take(errors[f], sample);
-                    if (samples.fields()[f].range > 0 && errors[f] > largest * unit) largest = errors[f] / unit;
+                    if (samples.fields()[f].range > 0 && errors[f] > largest * unit)
+                        largest = errors[f] / unit;
                 }
             }
             if (leafErrors) (*leafErrors)[std::size_t(leaf)] = largest;
@@ -77,7 +81,8 @@ SampleTotals measureSamples(const ErrorSamples& samples, const SamplesByLeaf& so
     return all;
 }
 
-// 99.9 % of the errors are at most this, in the lists' unit; also counts what was measured and what was skipped.
+// 99.9 % of the errors are at most this, in the lists' unit; also counts what was measured and what was
+// skipped.
 double quantile999(const std::vector<float>& list, FieldError& result) {
     std::vector<float> measured;
     measured.reserve(list.size());
@@ -98,8 +103,8 @@ struct ElementSums {
     std::vector<double> integral;
 };
 
-ElementSums sumElements(const ErrorSamples& samples, const SampledField& sampled, const std::vector<float>& list,
-                        std::int64_t begin, std::int64_t end) {
+ElementSums sumElements(const ErrorSamples& samples, const SampledField& sampled,
+                        const std::vector<float>& list, std::int64_t begin, std::int64_t end) {
     ElementSums sums;
     const Field& field = *sampled.field;
     sums.integral.assign(std::size_t(field.components), 0);
@@ -138,7 +143,8 @@ void sumOverElements(const ErrorSamples& samples, const SampledField& sampled, c
     for (const ElementSums& part : parts) {
         squares += part.squares;
         weights += part.weights;
-        for (std::size_t c = 0; c < result.integralMesh.size(); ++c) result.integralMesh[c] += part.integral[c];
+        for (std::size_t c = 0; c < result.integralMesh.size(); ++c)
+            result.integralMesh[c] += part.integral[c];
     }
     result.rms = weights > 0 ? std::sqrt(squares / weights) * unitOf(sampled) : 0;
 }
@@ -158,7 +164,8 @@ double tileSum(const float* values) {
 }
 
 // Points whose components are all finite, when some are not.
-void addPartlyFinite(const Tile& tile, const SampledField& sampled, double cube, StoredSums& sums, std::size_t f) {
+void addPartlyFinite(const Tile& tile, const SampledField& sampled, double cube, StoredSums& sums,
+                     std::size_t f) {
     for (int i = 0; i < kTilePoints; ++i) {
         if (!tile.covered(i)) continue;
         bool valid = true;
@@ -210,7 +217,8 @@ StoredSums sumStored(std::span<const SampledField> fields, const BrickTree& tree
         for (std::int64_t leaf = begin; leaf < end; ++leaf) {
             const double h = tree.spacingWorld(tree.leaves()[std::size_t(leaf)].level);
             for (int t = 0; t < store.tileCount(); ++t)
-                if (const Tile* tile = store.tile(std::size_t(leaf), t)) addTile(*tile, fields, h * h * h, part);
+                if (const Tile* tile = store.tile(std::size_t(leaf), t))
+                    addTile(*tile, fields, h * h * h, part);
         }
     });
     StoredSums all = empty();
@@ -222,8 +230,8 @@ StoredSums sumStored(std::span<const SampledField> fields, const BrickTree& tree
     return all;
 }
 
-FieldError fieldReport(const ErrorSamples& samples, const SampledField& sampled, const std::vector<float>& list,
-                       const Worst& worst, const Execution& execution) {
+FieldError fieldReport(const ErrorSamples& samples, const SampledField& sampled,
+                       const std::vector<float>& list, const Worst& worst, const Execution& execution) {
     FieldError result;
     result.name = sampled.field->name;
     result.components = sampled.field->components;
@@ -243,7 +251,8 @@ FieldError fieldReport(const ErrorSamples& samples, const SampledField& sampled,
 
 void countSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, std::int64_t fullyCovered,
                   ErrorReport& report) {
-    for (const std::uint32_t sample : sorted.ids) ++(sample < samples.nodeCount() ? report.nodes : report.centroids);
+    for (const std::uint32_t sample : sorted.ids)
+        ++(sample < samples.nodeCount() ? report.nodes : report.centroids);
     report.outsideBricks = sorted.outside;
     report.flatElements = samples.flatElements();
     report.invertedElements = samples.invertedElements();
@@ -251,8 +260,8 @@ void countSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, std:
 }
 
 ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                        const BrickStore& store, const Reconstruction& reconstruction, const Execution& execution,
-                        const MeasureOptions& options) {
+                        const BrickStore& store, const Reconstruction& reconstruction,
+                        const Execution& execution, const MeasureOptions& options) {
     std::optional<ErrorSamples> own;
     if (!options.samples) own.emplace(mesh, fields, execution);
     const ErrorSamples& samples = options.samples ? *options.samples : *own;
@@ -286,15 +295,17 @@ ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const 
 }  // namespace
 
 ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                         const BrickStore& store, const NearestPointIndex& nearest, const Execution& execution,
-                         const MeasureOptions& options) {
-    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest), execution, options);
+                         const BrickStore& store, const NearestPointIndex& nearest,
+                         const Execution& execution, const MeasureOptions& options) {
+    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest),
+                       execution, options);
 }
 
 ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                          const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
                          const MeasureOptions& options) {
-    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest), execution, options);
+    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest),
+                       execution, options);
 }
 
 }  // namespace tessera

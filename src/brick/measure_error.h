@@ -21,18 +21,22 @@ struct MeasureOptions {
     std::optional<Box3d> boundsWorld;
     /// When not null: the places and volumes of the same mesh and fields, from an earlier measurement.
     const ErrorSamples* samples = nullptr;
-    /// When not null: receives the largest relative error of any field in each leaf (drives refinement), leafCount entries.
+    /// When not null: receives the largest relative error of any field in each leaf (drives refinement),
+    /// leafCount entries.
     std::vector<double>* leafErrors = nullptr;
 };
 
-/// Measures trilinear reconstruction against the exact field. A lattice corner outside the mesh takes the value at the nearest mesh
-/// point; across a change of level the border is interpolated from the coarse brick (docs/algorithms.md, Seams).
-/// The volume-weighted RMS takes each element by the quadrature that is exact for quadratics: a node weighs |volume| / 20, the centroid
-/// 4 |volume| / 5 (cell fields: the centroid |volume|). The same for any number of threads.
+/// Measures trilinear reconstruction against the exact field. A lattice corner outside the mesh takes the
+/// value at the nearest mesh point; across a change of level the border is interpolated from the coarse brick
+/// (docs/algorithms.md, Seams). The volume-weighted RMS takes each element by the quadrature that is exact
+/// for quadratics: a node weighs |volume| / 20, the centroid 4 |volume| / 5 (cell fields: the centroid
+/// |volume|). The same for any number of threads.
 /// @param fields indices into mesh.fields whose components are the store's channels, in this order.
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
-                         const NearestPointIndex& nearest, const Execution& execution, const MeasureOptions& options = {});
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
-                         const NearestOnDemand& nearest, const Execution& execution, const MeasureOptions& options = {});
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                         const BrickStore& store, const NearestPointIndex& nearest,
+                         const Execution& execution, const MeasureOptions& options = {});
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                         const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
+                         const MeasureOptions& options = {});
 
 }  // namespace tessera

@@ -11,8 +11,8 @@ ElementOverlap::ElementOverlap(const std::array<Vec3d, 4>& nodes) : nodes_(nodes
 
 namespace {
 
-// Separates the corners, given relative to the box's centre, from the box of half size `half` along one axis. The tolerance covers
-// the rounding of the axis and of the projections.
+// Separates the corners, given relative to the box's centre, from the box of half size `half` along one axis.
+// The tolerance covers the rounding of the axis and of the projections.
 bool separates(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half) {
     double low = glm::dot(axis, corners[0]), high = low;
     double largest = std::abs(low);
@@ -49,7 +49,8 @@ bool ElementOverlap::touches(const Box3d& box) const {
     for (std::size_t a = 0; a < 4; ++a)
         for (std::size_t b = a + 1; b < 4; ++b) {
             const Vec3d edge = corners[b] - corners[a];
-            if (separates({0, -edge.z, edge.y}, corners, half) || separates({edge.z, 0, -edge.x}, corners, half) ||
+            if (separates({0, -edge.z, edge.y}, corners, half) ||
+                separates({edge.z, 0, -edge.x}, corners, half) ||
                 separates({-edge.y, edge.x, 0}, corners, half))
                 return false;
         }

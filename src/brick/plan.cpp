@@ -11,8 +11,8 @@ namespace tessera {
 
 namespace {
 
-// Share of a brick's elements that may be smaller than the size its spacing follows. The quantile counts elements, not volume: by
-// volume a graded region much smaller than the brick would never be seen.
+// Share of a brick's elements that may be smaller than the size its spacing follows. The quantile counts
+// elements, not volume: by volume a graded region much smaller than the brick would never be seen.
 constexpr double kSizeQuantile = 0.15;
 // Without any bound or spacing from the user a plan by element size stays below this.
 constexpr std::int64_t kDefaultElementSizeVoxels = 20'000'000;
@@ -23,8 +23,8 @@ std::string shortNumber(double value) {
     return text;
 }
 
-// An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and so an
-// ordinary size; flat boundary-layer elements come out between their thickness and their length.
+// An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and
+// so an ordinary size; flat boundary-layer elements come out between their thickness and their length.
 std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Execution& execution) {
     std::vector<float> sizes(mesh.tets.size());
     parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
@@ -54,11 +54,12 @@ double localSize(const PlannedBrick& brick, const std::vector<float>& sizes) {
     return double(*at);
 }
 
-std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxLeaves, std::vector<BrickKey>* keys,
-                          const Execution& execution) {
+std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxLeaves,
+                          std::vector<BrickKey>* keys, const Execution& execution) {
     const std::int64_t count = touchedBricks(mesh, frame, std::int64_t(maxLeaves), keys, execution);
     if (count >= 0) return count;
-    // Too large a box of bricks for a grid of marks: go down from coarse bricks, leaving empty space out on the way.
+    // Too large a box of bricks for a grid of marks: go down from coarse bricks, leaving empty space out on
+    // the way.
     const int down = 8;
     frame.rootSpacingWorld = std::ldexp(frame.rootSpacingWorld, down);
     frame.maxDepth = down;
@@ -74,16 +75,17 @@ std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxL
 }
 
 // Largest resolution whose plan fits, by bisection; 0 when none does.
-int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions options, std::size_t maxLeaves, int tooLarge,
-                      const Execution& execution) {
+int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions options, std::size_t maxLeaves,
+                      int tooLarge, const Execution& execution) {
     options.frame.reset();
     options.spacingWorld = 0;
     int fits = 1, fails = tooLarge;
     while (fails - fits > std::max(1, fits / 64)) {
         // Counts grow with the cube; aim at a tenth of the interval first when it is wide.
-        options.resolution = fails > 8 * fits ? std::max(fits + 1, int(std::sqrt(double(fits) * fails)))
-                                              : (fits + fails) / 2;
-        const std::int64_t count = countUniform(mesh, chooseFrame(meshBox, options), maxLeaves, nullptr, execution);
+        options.resolution =
+            fails > 8 * fits ? std::max(fits + 1, int(std::sqrt(double(fits) * fails))) : (fits + fails) / 2;
+        const std::int64_t count =
+            countUniform(mesh, chooseFrame(meshBox, options), maxLeaves, nullptr, execution);
         (count <= std::int64_t(maxLeaves) ? fits : fails) = options.resolution;
     }
     return fits > 1 ? fits : 0;
@@ -92,11 +94,13 @@ int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions o
 std::string budgetText(const RefineOptions& options, std::size_t maxLeaves) {
     const double points = double(maxLeaves) * std::pow(options.brickCells, 3);
     return shortNumber(points) + " voxels (" +
-           (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound" : "a quarter of the memory here") + ")";
+           (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound"
+                                                                : "a quarter of the memory here") +
+           ")";
 }
 
-BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options, std::size_t maxLeaves,
-                      const Execution& execution) {
+BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
+                      std::size_t maxLeaves, const Execution& execution) {
     const PlanFrame frame = chooseFrame(meshBox, options);
     std::vector<BrickKey> keys;
     const std::int64_t count = countUniform(mesh, frame, maxLeaves, &keys, execution);
@@ -111,13 +115,16 @@ BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOpt
                                      shortNumber(longest / (fits - 1)) + ") fits"
                                : "; not even one brick fits"));
     }
-    return BrickTree(frame.originWorld, frame.spacingWorld(frame.maxDepth), frame.brickCells, std::move(keys));
+    return BrickTree(frame.originWorld, frame.spacingWorld(frame.maxDepth), frame.brickCells,
+                     std::move(keys));
 }
 
 BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
-                            std::size_t maxLeaves, const Execution& execution, std::vector<std::string>* notes) {
+                            std::size_t maxLeaves, const Execution& execution,
+                            std::vector<std::string>* notes) {
     const PlanFrame frame = chooseFrame(meshBox, options);
-    const bool isDefault = options.maxVoxels == 0 && options.maxMemoryBytes == 0 && !hasFinestSpacing(options);
+    const bool isDefault =
+        options.maxVoxels == 0 && options.maxMemoryBytes == 0 && !hasFinestSpacing(options);
     const std::size_t brickPoints = std::size_t(std::pow(options.brickCells, 3));
     if (isDefault) maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
     const std::vector<float> sizes = elementSizes(mesh, frame.rootSpacingWorld, execution);
@@ -133,7 +140,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
         parallelFor(execution, std::int64_t(leaves.size()), [&](std::int64_t i) {
             const PlannedBrick& brick = *leaves[std::size_t(i)];
             if (brick.key.level != depth) return;
-            const double spacing = std::ldexp(1.0, -depth);   // in units of the root spacing, as the sizes are
+            const double spacing = std::ldexp(1.0, -depth);  // in units of the root spacing, as the sizes are
             wanted[std::size_t(i)] = spacing > localSize(brick, sizes) / options.samplesPerElement ? 1 : 0;
         });
         std::vector<BrickKey> splits;
@@ -143,11 +150,13 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
         if (plan.split(splits, maxLeaves, execution)) continue;
         const std::string fits = shortNumber(frame.spacingWorld(depth));
         if (hasFinestSpacing(options))
-            throw InputError("bricks down to a spacing of " + shortNumber(frame.spacingWorld(frame.maxDepth)) +
-                             " need more than " + budgetText(options, maxLeaves) + "; a finest spacing of " + fits + " fits");
+            throw InputError("bricks down to a spacing of " +
+                             shortNumber(frame.spacingWorld(frame.maxDepth)) + " need more than " +
+                             budgetText(options, maxLeaves) + "; a finest spacing of " + fits + " fits");
         if (notes)
-            notes->push_back("the elements ask for a spacing below " + fits + ", which would take more than " +
-                             shortNumber(double(maxLeaves * brickPoints)) + " voxels: the finest spacing is " + fits);
+            notes->push_back("the elements ask for a spacing below " + fits +
+                             ", which would take more than " + shortNumber(double(maxLeaves * brickPoints)) +
+                             " voxels: the finest spacing is " + fits);
         break;
     }
     return plan.tree(options.frame ? frame.maxDepth : -1);
@@ -155,8 +164,8 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
 
 }  // namespace
 
-BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution, int channels,
-                     std::vector<std::string>* notes) {
+BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,
+                     int channels, std::vector<std::string>* notes) {
     const Box3d meshBox = meshBounds(mesh, execution);
     checkOptions(mesh, meshBox, options);
     TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");

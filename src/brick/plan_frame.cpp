@@ -13,7 +13,7 @@ namespace tessera {
 
 namespace {
 
-constexpr double kMaxIndex = 1 << 29;             // of level 0; resamplers take indices up to 2^30
+constexpr double kMaxIndex = 1 << 29;  // of level 0; resamplers take indices up to 2^30
 constexpr int kDefaultUniformResolution = 256;
 constexpr int kDefaultLevels = 8;
 
@@ -23,7 +23,9 @@ std::string shortNumber(double value) {
     return text;
 }
 
-bool finite(const Vec3d& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Vec3d& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 double longestSide(const Box3d& box) {
     const Vec3d size = box.size();
@@ -36,7 +38,9 @@ double farthestIndex(const Box3d& box, const Vec3d& origin, double spacing) {
     return std::max({far.x, far.y, far.z});
 }
 
-int rootPoints(int brickCells) { return brickCells == 8 ? 32 : 64; }
+int rootPoints(int brickCells) {
+    return brickCells == 8 ? 32 : 64;
+}
 
 double finestSpacing(const RefineOptions& options, double longest) {
     if (options.frame) return options.frame->spacingWorld;
@@ -53,7 +57,8 @@ Box3d meshBounds(const TetMesh& mesh, const Execution& execution) {
     parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
         Box3d box;
         for (std::int64_t e = begin; e < end; ++e)
-            for (const std::int32_t node : mesh.tets[std::size_t(e)]) box.include(mesh.points[std::size_t(node)]);
+            for (const std::int32_t node : mesh.tets[std::size_t(e)])
+                box.include(mesh.points[std::size_t(node)]);
         parts[std::size_t(begin / kChunk)] = box;
     });
     Box3d all;
@@ -76,8 +81,10 @@ void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions
     require(options.resolution == 0 || options.spacingWorld == 0, "give a resolution or a spacing, not both");
     require(std::isfinite(options.samplesPerElement) && options.samplesPerElement > 0,
             "samples per element must be positive, not " + shortNumber(options.samplesPerElement));
-    require(options.maxLevels >= 0, "the number of levels must be at least 1, not " + std::to_string(options.maxLevels));
-    require(options.maxVoxels >= 0 && options.maxMemoryBytes >= 0, "bounds on voxels and memory must be positive");
+    require(options.maxLevels >= 0,
+            "the number of levels must be at least 1, not " + std::to_string(options.maxLevels));
+    require(options.maxVoxels >= 0 && options.maxMemoryBytes >= 0,
+            "bounds on voxels and memory must be positive");
     if (options.criterion == Criterion::error)
         require(std::isfinite(options.maxError) && options.maxError > 0,
                 "the error bound must be positive, not " + shortNumber(options.maxError));
@@ -106,9 +113,9 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     frame.boundsWorld = options.boundsWorld;
     frame.meshBoundsWorld = meshBox;
     frame.originWorld = options.frame ? options.frame->originWorld : box.min;
-    const int levels = options.maxLevels > 0                              ? options.maxLevels
+    const int levels = options.maxLevels > 0                         ? options.maxLevels
                        : options.criterion == Criterion::elementSize ? kDefaultLevels
-                                                                          : 31;
+                                                                     : 31;
     if (options.criterion == Criterion::uniform || hasFinestSpacing(options)) {
         const double finest = finestSpacing(options, longest);
         const double far = farthestIndex(sampled, frame.originWorld, finest);

@@ -5,7 +5,8 @@
 
 namespace tessera {
 
-/// Throws InputError for options out of range or that contradict each other, and for a mesh without elements or extent.
+/// Throws InputError for options out of range or that contradict each other, and for a mesh without elements
+/// or extent.
 void checkOptions(const TetMesh& mesh, const Box3d& meshBoundsWorld, const RefineOptions& options);
 
 /// mesh.boundsWorld(), on all threads.
@@ -16,8 +17,9 @@ inline bool hasFinestSpacing(const RefineOptions& options) {
     return options.resolution > 0 || options.spacingWorld > 0 || options.frame.has_value();
 }
 
-/// The lattices for these options. With a finest spacing given, depth frame.maxDepth has it; else depth 0 has 64 points (32 for
-/// bricks of 8) along the longest axis, from the bounds' minimum to their maximum, and so has every finer one.
+/// The lattices for these options. With a finest spacing given, depth frame.maxDepth has it; else depth 0 has
+/// 64 points (32 for bricks of 8) along the longest axis, from the bounds' minimum to their maximum, and so
+/// has every finer one.
 PlanFrame chooseFrame(const Box3d& meshBoundsWorld, const RefineOptions& options);
 
 /// Leaves that the bounds on voxels and memory allow.

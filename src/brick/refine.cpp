@@ -34,12 +34,12 @@ std::string placeText(const Vec3d& p) {
 
 // The bound on one field, in field units; infinite for fields that don't matter.
 struct FieldBound {
-    std::size_t field = 0;    // position among the chosen fields
+    std::size_t field = 0;  // position among the chosen fields
     double bound = 0;
 };
 
-std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fields, const ErrorSamples& samples,
-                                    const RefineOptions& options) {
+std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fields,
+                                    const ErrorSamples& samples, const RefineOptions& options) {
     std::vector<FieldBound> bounds;
     bool onlyCells = true;
     for (std::size_t f = 0; f < fields.size(); ++f) {
@@ -47,21 +47,25 @@ std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fi
         const bool isCell = field.location == FieldLocation::cell;
         const bool named = std::find(options.errorFields.begin(), options.errorFields.end(), fields[f]) !=
                            options.errorFields.end();
-        if (!named && (!options.errorFields.empty() || (isCell && options.measure == ErrorMeasure::max))) continue;
+        if (!named && (!options.errorFields.empty() || (isCell && options.measure == ErrorMeasure::max)))
+            continue;
         onlyCells = onlyCells && isCell;
         const double range = samples.fields()[f].range;
         const double bound = options.maxErrorIsRelative ? options.maxError * range : options.maxError;
-        if (bound == 0) continue;   // a constant field has no relative error
+        if (bound == 0) continue;  // a constant field has no relative error
         const double roundOff = std::ldexp(samples.fields()[f].largest, -24);
         if (bound < roundOff)
-            throw InputError("an error bound of " + shortNumber(bound) + " on field " + field.name +
-                             " is below what 32-bit samples of its values can hold; the smallest that makes sense is " +
-                             shortNumber(2 * roundOff));
+            throw InputError(
+                "an error bound of " + shortNumber(bound) + " on field " + field.name +
+                " is below what 32-bit samples of its values can hold; the smallest that makes sense is " +
+                shortNumber(2 * roundOff));
         bounds.push_back({f, bound});
     }
     if (onlyCells && options.measure == ErrorMeasure::max)
-        throw InputError("cell fields jump from element to element, so their maximal error never falls below a bound: choose "
-                         "a point field, or --error-measure rms");
+        throw InputError(
+            "cell fields jump from element to element, so their maximal error never falls below a bound: "
+            "choose "
+            "a point field, or --error-measure rms");
     return bounds;
 }
 
@@ -91,9 +95,10 @@ class ErrorRefinement {
         if (options.maxVoxels == 0 && options.maxMemoryBytes == 0)
             budgetLeaves_ = std::min(budgetLeaves_, std::size_t(kDefaultErrorVoxels / brickPoints()));
         if (plan_.leafCount() > budgetLeaves_)
-            throw InputError("the coarsest plan has " + std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +
-                             " voxels, more than the " + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) +
-                             " allowed");
+            throw InputError("the coarsest plan has " +
+                             std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +
+                             " voxels, more than the " +
+                             std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + " allowed");
     }
 
     BrickResult run();
@@ -126,11 +131,11 @@ class ErrorRefinement {
     std::vector<FieldBound> bounds_;
     BrickPlan plan_;
     std::size_t budgetLeaves_ = 0;
-    std::vector<PlannedBrick*> leaves_;      // in the order of tree_.leaves()
-    std::vector<std::uint8_t> fresh_;        // sampled in this round
+    std::vector<PlannedBrick*> leaves_;  // in the order of tree_.leaves()
+    std::vector<std::uint8_t> fresh_;    // sampled in this round
     BrickTree tree_;
     BrickStore store_;
-    std::vector<double> nodeWeight_;         // rms: share of the volume that a node stands for
+    std::vector<double> nodeWeight_;  // rms: share of the volume that a node stands for
     double totalWeight_ = 0;
     ResampleStatistics statistics_;
     BrickTimes times_;
@@ -182,7 +187,8 @@ bool ErrorRefinement::touchesFresh(std::size_t leaf) const {
     for (int n = 0; n < 27; ++n) {
         const BrickKey near{key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
         const std::int64_t other = tree_.findCovering(near);
-        // Only a leaf whose coarser neighbour went away reads other values than before; a finer neighbour changes nothing here.
+        // Only a leaf whose coarser neighbour went away reads other values than before; a finer neighbour
+        // changes nothing here.
         if (other >= 0 && fresh_[std::size_t(other)]) return true;
     }
     return false;
@@ -222,12 +228,14 @@ void ErrorRefinement::measureChanged() {
     if (rounds_ == 0) buildIfNeeded(nearest_, store_);
     const Reconstruction reconstruction(mesh_, fields_, tree_, store_, nearest_);
     constexpr std::int64_t kChunk = 16;
-    parallelForChunks(execution_, std::int64_t(leaves_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        LeafSampler sampler(samples_, tree_, store_, reconstruction);
-        for (std::int64_t i = begin; i < end; ++i)
-            if (touchesFresh(std::size_t(i)))
-                leaves_[std::size_t(i)]->ratio = leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
-    });
+    parallelForChunks(execution_, std::int64_t(leaves_.size()), kChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          LeafSampler sampler(samples_, tree_, store_, reconstruction);
+                          for (std::int64_t i = begin; i < end; ++i)
+                              if (touchesFresh(std::size_t(i)))
+                                  leaves_[std::size_t(i)]->ratio =
+                                      leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
+                      });
     times_.verifyMs += timer.elapsedMs();
 }
 
@@ -261,7 +269,8 @@ std::vector<BrickKey> ErrorRefinement::wanted(std::size_t limit) const {
         const double total = totalMeanSquare();
         double sum = 0;
         std::size_t count = 0;
-        while (count < worst.size() && sum < std::max(0.5 * (total - 1), 0.02 * total)) sum += worst[count++]->ratio;
+        while (count < worst.size() && sum < std::max(0.5 * (total - 1), 0.02 * total))
+            sum += worst[count++]->ratio;
         worst.resize(total > 1 ? count : 0);
     }
     if (worst.size() > limit) worst.resize(limit);
@@ -277,14 +286,15 @@ bool ErrorRefinement::refine() {
     const bool any = !keys.empty();
     bool done = false;
     while (!keys.empty() && !(done = plan_.split(keys, budgetLeaves_, execution_))) {
-        stopped_ = "the bound on voxels (" + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + ")";
+        stopped_ =
+            "the bound on voxels (" + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + ")";
         keys.resize(keys.size() / 2);
     }
     times_.planMs += timer.elapsedMs();
-    if (!any && stopped_.empty() && std::any_of(leaves_.begin(), leaves_.end(), [](const PlannedBrick* leaf) {
-            return leaf->ratio > 1;
-        }))
-        stopped_ = "the finest spacing allowed (" + shortNumber(plan_.frame().spacingWorld(plan_.frame().maxDepth)) + ")";
+    if (!any && stopped_.empty() &&
+        std::any_of(leaves_.begin(), leaves_.end(), [](const PlannedBrick* leaf) { return leaf->ratio > 1; }))
+        stopped_ = "the finest spacing allowed (" +
+                   shortNumber(plan_.frame().spacingWorld(plan_.frame().maxDepth)) + ")";
     return done;
 }
 
@@ -305,10 +315,10 @@ std::string ErrorRefinement::whyStopped(const ErrorReport& report) const {
     }
     const FieldError& error = report.fields[worst->field];
     const double reached = options_.measure == ErrorMeasure::rms ? error.rms : error.max;
-    return (stopped_.empty() ? std::string("no brick left to split") : stopped_) + " ended the refinement at " +
-           (options_.measure == ErrorMeasure::rms ? "an RMS" : "a largest") + " error of " + shortNumber(reached) +
-           " in " + error.name + " (bound " + shortNumber(worst->bound) + "); the worst spot is " +
-           placeText(error.worstPlaceWorld);
+    return (stopped_.empty() ? std::string("no brick left to split") : stopped_) +
+           " ended the refinement at " + (options_.measure == ErrorMeasure::rms ? "an RMS" : "a largest") +
+           " error of " + shortNumber(reached) + " in " + error.name + " (bound " +
+           shortNumber(worst->bound) + "); the worst spot is " + placeText(error.worstPlaceWorld);
 }
 
 ErrorReport ErrorRefinement::report() {
@@ -336,7 +346,8 @@ BrickResult ErrorRefinement::run() {
         result.report = report();
         result.bounded = withinBound(result.report);
         if (result.bounded || !stopped_.empty()) break;
-        // A coarse corner's value can change through a chain of level borders, beyond the neighbours that were measured again.
+        // A coarse corner's value can change through a chain of level borders, beyond the neighbours that
+        // were measured again.
         std::fill(fresh_.begin(), fresh_.end(), std::uint8_t(1));
         measureChanged();
         if (!refine()) break;

@@ -10,9 +10,9 @@ namespace tessera {
 
 namespace {
 
-constexpr int kGroupPoints = 64;                         // points along the edge of the largest block
-constexpr double kGroupBytes = 8e6;                      // and its size at most
-constexpr double kGroupFill = 0.75;                      // share of a block that leaves must own
+constexpr int kGroupPoints = 64;     // points along the edge of the largest block
+constexpr double kGroupBytes = 8e6;  // and its size at most
+constexpr double kGroupFill = 0.75;  // share of a block that leaves must own
 
 // One block to sample: the leaves (all of one level) whose points it holds.
 struct Group {
@@ -55,7 +55,8 @@ std::vector<Group> groupLevel(const BrickTree& tree, const std::vector<std::size
     std::unordered_map<BrickKey, std::size_t, BrickKeyHash> groupAt;
     std::vector<std::vector<std::size_t>> cubes;
     for (const std::size_t leaf : leaves) {
-        const auto [slot, fresh] = groupAt.try_emplace({0, floorDiv(tree.leaves()[leaf].index, edge)}, cubes.size());
+        const auto [slot, fresh] =
+            groupAt.try_emplace({0, floorDiv(tree.leaves()[leaf].index, edge)}, cubes.size());
         if (fresh) cubes.emplace_back();
         cubes[slot->second].push_back(leaf);
     }
@@ -90,8 +91,8 @@ void resampleLeaves(const BrickTree& tree, std::span<const std::size_t> leaves, 
     }
 }
 
-BrickStore resampleTree(const BrickTree& tree, BoundResampler& resampler, int channels, const Execution& execution,
-                        ResampleStatistics& statistics) {
+BrickStore resampleTree(const BrickTree& tree, BoundResampler& resampler, int channels,
+                        const Execution& execution, ResampleStatistics& statistics) {
     BrickStore store(tree.brickCells(), tree.leafCount(), channels);
     std::vector<std::size_t> all(tree.leafCount());
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;

@@ -11,8 +11,8 @@ namespace tessera {
 
 namespace {
 
-// Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can tell apart, and more than the
-// rounding of a place in index space.
+// Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can tell
+// apart, and more than the rounding of a place in index space.
 constexpr double kOnPlane = 1.0 / (1 << 30);
 
 double snappedFraction(double t) {
@@ -48,7 +48,8 @@ Reconstruction::Reconstruction(const TetMesh& mesh, std::span<const int> fields,
 void Reconstruction::nameChannels(std::span<const int> fields) {
     for (const int f : fields)
         for (int c = 0; c < mesh_->fields[std::size_t(f)].components; ++c) channelOf_.emplace_back(f, c);
-    TESSERA_CHECK(std::int64_t(channelOf_.size()) == store_->channels(), "the fields are the store's channels");
+    TESSERA_CHECK(std::int64_t(channelOf_.size()) == store_->channels(),
+                  "the fields are the store's channels");
 }
 
 SeamValue Reconstruction::at(int level, const Vec3i& p, int channel) const {
@@ -61,7 +62,8 @@ bool Reconstruction::resolve(int level, const Vec3i& p, int firstChannel, std::s
     const int b = tree_->brickCells();
     const Vec3i owner = floorDiv(p, b);
     const Vec3i rest = p - owner * b;
-    // The bricks of this level whose closed boxes hold p: the owner, and on each axis where p lies on a border the one before it.
+    // The bricks of this level whose closed boxes hold p: the owner, and on each axis where p lies on a
+    // border the one before it.
     int coarsest = level;
     std::int64_t ownerLeaf = -1;
     const int mask = (rest.x == 0 ? 1 : 0) | (rest.y == 0 ? 2 : 0) | (rest.z == 0 ? 4 : 0);
@@ -87,11 +89,13 @@ bool Reconstruction::stored(std::size_t leaf, const Vec3i& local, int level, con
     const Tile* tile = store_->tile(leaf, ((local.x >> 3) * n + (local.y >> 3)) * n + (local.z >> 3));
     const int offset = ((local.x & 7) * 8 + (local.y & 7)) * 8 + (local.z & 7);
     if (!tile || !tile->covered(offset)) return outside(level, p, firstChannel, values);
-    for (std::size_t c = 0; c < values.size(); ++c) values[c] = double(tile->channel(firstChannel + int(c))[offset]);
+    for (std::size_t c = 0; c < values.size(); ++c)
+        values[c] = double(tile->channel(firstChannel + int(c))[offset]);
     return true;
 }
 
-bool Reconstruction::fromCoarse(int level, const Vec3i& p, int coarse, int firstChannel, std::span<double> values) const {
+bool Reconstruction::fromCoarse(int level, const Vec3i& p, int coarse, int firstChannel,
+                                std::span<double> values) const {
     const int step = 1 << (coarse - level);
     const Vec3i cell = floorDiv(p, step);
     const Vec3d t = Vec3d(p - cell * step) / double(step);
@@ -112,7 +116,7 @@ bool Reconstruction::fromCoarse(int level, const Vec3i& p, int coarse, int first
 }
 
 bool Reconstruction::outside(int level, const Vec3i& p, int firstChannel, std::span<double> values) const {
-    if (values.empty()) return false;   // the caller asks for coverage only
+    if (values.empty()) return false;  // the caller asks for coverage only
     const Vec3d place = tree_->lattice(level).worldFromIndex(Vec3d(p));
     // Most callers ask within a voxel of the mesh; a short search first is cheaper.
     const NearestPointIndex& nearest = nearest_ ? *nearest_ : nearestOnDemand_->get();
@@ -126,7 +130,8 @@ bool Reconstruction::outside(int level, const Vec3i& p, int firstChannel, std::s
     return false;
 }
 
-double Reconstruction::interpolate(std::size_t leaf, const Vec3d& index, int channel, int* coveredCorners) const {
+double Reconstruction::interpolate(std::size_t leaf, const Vec3d& index, int channel,
+                                   int* coveredCorners) const {
     const BrickKey& key = tree_->leaves()[leaf];
     const Vec3i first = key.index * tree_->brickCells();
     const CellPlace place = locateInBrick(index - Vec3d(first), tree_->brickCells());

@@ -16,25 +16,29 @@ namespace tessera {
 /// A value of the reconstruction at a lattice point.
 struct SeamValue {
     double value = 0;
-    bool covered = false;   ///< in the mesh; else the value is that of the nearest mesh point
+    bool covered = false;  ///< in the mesh; else the value is that of the nearest mesh point
 };
 
 /// A place inside a brick: its cell, and where in the cell.
 struct CellPlace {
-    Vec3i cell{0};        ///< local, in [0, B) on every axis
-    Vec3d fraction{0};    ///< in [0, 1]; exactly 0 or 1 within 2^-30 of a lattice plane
+    Vec3i cell{0};      ///< local, in [0, B) on every axis
+    Vec3d fraction{0};  ///< in [0, 1]; exactly 0 or 1 within 2^-30 of a lattice plane
 };
-/// @param local place in index space of the brick's level, counted from the brick's first point; may be off by rounding.
+/// @param local place in index space of the brick's level, counted from the brick's first point; may be off
+/// by rounding.
 CellPlace locateInBrick(const Vec3d& local, int brickCells);
 
 /// Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2); its trilinear weight at `fraction`.
-inline Vec3i cornerOffset(int c) { return {c & 1, (c >> 1) & 1, c >> 2}; }
+inline Vec3i cornerOffset(int c) {
+    return {c & 1, (c >> 1) & 1, c >> 2};
+}
 inline double cornerWeight(const Vec3d& fraction, int c) {
     return (c & 1 ? fraction.x : 1 - fraction.x) * (c & 2 ? fraction.y : 1 - fraction.y) *
            (c & 4 ? fraction.z : 1 - fraction.z);
 }
 
-/// A nearest-point index that is built when first asked for: meshes that fill their bricks never need one. Thread-safe.
+/// A nearest-point index that is built when first asked for: meshes that fill their bricks never need one.
+/// Thread-safe.
 class NearestOnDemand {
   public:
     NearestOnDemand(const TetMesh& mesh, int threads) : mesh_(&mesh), threads_(threads) {}
@@ -50,23 +54,26 @@ class NearestOnDemand {
     mutable std::unique_ptr<NearestPointIndex> index_;
 };
 
-/// Reads the continuous reconstruction: stored samples, except that a lattice point on the border to a coarser brick takes the value
-/// that trilinear interpolation in the coarse brick gives there, and a point outside the mesh takes the value at the nearest mesh
-/// point. Thread-safe.
+/// Reads the continuous reconstruction: stored samples, except that a lattice point on the border to a
+/// coarser brick takes the value that trilinear interpolation in the coarse brick gives there, and a point
+/// outside the mesh takes the value at the nearest mesh point. Thread-safe.
 class Reconstruction {
   public:
-    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
-                   const NearestPointIndex& nearest);
-    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
-                   const NearestOnDemand& nearest);
+    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                   const BrickStore& store, const NearestPointIndex& nearest);
+    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                   const BrickStore& store, const NearestOnDemand& nearest);
     /// At point `p` of the lattice of `level`, which must lie in the closed box of a leaf of that level.
     SeamValue at(int level, const Vec3i& p, int channel) const;
-    /// The same for several channels at once: values.size() of them from `firstChannel` on; none asks for coverage only.
-    /// Returns whether the point (when interpolated: every coarse corner it depends on) is in the mesh.
+    /// The same for several channels at once: values.size() of them from `firstChannel` on; none asks for
+    /// coverage only. Returns whether the point (when interpolated: every coarse corner it depends on) is in
+    /// the mesh.
     bool resolve(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
-    /// Trilinear value at a place inside a leaf's closed box, in index space of the leaf's level. @param coveredCorners receives how
-    /// many of the cell's corners are in the mesh, when not null (corners of weight zero have no say and count as if they were).
-    double interpolate(std::size_t leaf, const Vec3d& index, int channel, int* coveredCorners = nullptr) const;
+    /// Trilinear value at a place inside a leaf's closed box, in index space of the leaf's level. @param
+    /// coveredCorners receives how many of the cell's corners are in the mesh, when not null (corners of
+    /// weight zero have no say and count as if they were).
+    double interpolate(std::size_t leaf, const Vec3d& index, int channel,
+                       int* coveredCorners = nullptr) const;
 
   private:
     bool stored(std::size_t leaf, const Vec3i& local, int level, const Vec3i& p, int firstChannel,
@@ -80,21 +87,22 @@ class Reconstruction {
     const BrickStore* store_;
     const NearestPointIndex* nearest_ = nullptr;
     const NearestOnDemand* nearestOnDemand_ = nullptr;
-    std::vector<std::pair<int, int>> channelOf_;   // (field, component) of each channel
+    std::vector<std::pair<int, int>> channelOf_;  // (field, component) of each channel
 };
 
-/// One layer-by-layer extension of the samples outside the mesh: points within `layers` steps (26 neighbours) of a covered point of the
-/// same level that no other leaf owns, with the value at the nearest mesh point.
+/// One layer-by-layer extension of the samples outside the mesh: points within `layers` steps (26 neighbours)
+/// of a covered point of the same level that no other leaf owns, with the value at the nearest mesh point.
 struct ExtensionPoint {
-    Vec3i index;                 ///< lattice index at `level`
+    Vec3i index;  ///< lattice index at `level`
     int level = 0;
-    std::uint32_t firstValue = 0;   ///< offset into ExtensionPoints::values, `channels` consecutive floats
+    std::uint32_t firstValue = 0;  ///< offset into ExtensionPoints::values, `channels` consecutive floats
 };
 struct ExtensionPoints {
-    std::vector<ExtensionPoint> points;   ///< ascending by level, z, y, x; each point once
+    std::vector<ExtensionPoint> points;  ///< ascending by level, z, y, x; each point once
     std::vector<float> values;
 };
-ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree, const BrickStore& store,
-                              const NearestPointIndex& nearest, int layers, const Execution& execution);
+ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                              const BrickStore& store, const NearestPointIndex& nearest, int layers,
+                              const Execution& execution);
 
 }  // namespace tessera

@@ -23,7 +23,7 @@ constexpr std::size_t kBufferBytes = std::size_t(1) << 20;
 
 // Names that a signal handler may have to unlink: fixed storage, because a handler must not allocate or lock.
 struct Slot {
-    std::atomic<int> state{0};   // 0 free, 1 being filled, 2 name is valid
+    std::atomic<int> state{0};  // 0 free, 1 being filled, 2 name is valid
     std::array<char, PATH_MAX> name{};
 };
 std::array<Slot, 64> slots;
@@ -44,7 +44,9 @@ void unregisterTemporary(int slot) {
     if (slot >= 0) slots[std::size_t(slot)].state.store(0);
 }
 
-std::string reason(int error) { return std::generic_category().message(error); }
+std::string reason(int error) {
+    return std::generic_category().message(error);
+}
 
 [[noreturn]] void fail(const std::string& path, const std::string& why) {
     throw IoError("can't write " + path + ": " + why);
@@ -99,7 +101,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path) {
         if (descriptor_ < 0 && (errno != EEXIST || attempt > 1000)) fail(path, reason(errno));
     }
     slot_ = registerTemporary(temporaryPath_);
-    if (exists && ::fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;   // a nicety only
+    if (exists && ::fchmod(descriptor_, existing.st_mode & 07777) != 0) errno = 0;  // a nicety only
 }
 
 AtomicFile::~AtomicFile() {
@@ -135,8 +137,10 @@ std::size_t AtomicFile::readAt(std::int64_t offset, void* bytes, std::size_t cou
 
 void AtomicFile::commit() {
     TESSERA_CHECK(descriptor_ >= 0, "a file is committed once");
-    // Some file systems (network, quota) tell of a full disk only here. Others can't sync at all, which is no failure.
-    if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS) fail(path_, reason(errno));
+    // Some file systems (network, quota) tell of a full disk only here. Others can't sync at all, which is no
+    // failure.
+    if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS)
+        fail(path_, reason(errno));
     struct stat status {};
     if (::fstat(descriptor_, &status) != 0) fail(path_, reason(errno));
     if (std::int64_t(status.st_size) != size_) fail(path_, "the file is shorter than what was written");
@@ -210,7 +214,9 @@ AtomicFileBuffer::pos_type AtomicFileBuffer::seekpos(pos_type position, std::ios
     return seekoff(off_type(position), std::ios_base::beg, mode);
 }
 
-void checkWritable(const std::string& path) { AtomicFile probe(path); }
+void checkWritable(const std::string& path) {
+    AtomicFile probe(path);
+}
 
 void writeFileAtomically(const std::string& path, const std::string& bytes) {
     AtomicFile file(path);

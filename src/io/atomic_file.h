@@ -10,17 +10,20 @@
 
 namespace tessera {
 
-/// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory, which `commit` syncs and
-/// renames; without a commit the destructor removes it and whatever stood at the name stays as it was.
+/// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory,
+/// which `commit` syncs and renames; without a commit the destructor removes it and whatever stood at the
+/// name stays as it was.
 class AtomicFile {
   public:
-    /// Throws IoError when the directory is missing or not writable, or `path` names something that isn't a regular file.
+    /// Throws IoError when the directory is missing or not writable, or `path` names something that isn't a
+    /// regular file.
     explicit AtomicFile(const std::string& path);
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
     AtomicFile& operator=(const AtomicFile&) = delete;
 
-    /// Writes all bytes at an offset from the file's start. Throws IoError with the system's reason (disk full, ...).
+    /// Writes all bytes at an offset from the file's start. Throws IoError with the system's reason (disk
+    /// full, ...).
     void writeAt(std::int64_t offset, const void* bytes, std::size_t count);
     /// Reads up to `count` bytes back; returns how many there were. Throws IoError.
     std::size_t readAt(std::int64_t offset, void* bytes, std::size_t count) const;
@@ -39,8 +42,8 @@ class AtomicFile {
     std::int64_t size_ = 0;
 };
 
-/// Output side of a std::ostream over an AtomicFile. Throws IoError from the write that failed (set the stream's exceptions to badbit so
-/// that it passes through) and Cancelled when the caller asks to stop.
+/// Output side of a std::ostream over an AtomicFile. Throws IoError from the write that failed (set the
+/// stream's exceptions to badbit so that it passes through) and Cancelled when the caller asks to stop.
 class AtomicFileBuffer : public std::streambuf {
   public:
     AtomicFileBuffer(AtomicFile& file, const Execution& execution);
@@ -57,17 +60,18 @@ class AtomicFileBuffer : public std::streambuf {
     AtomicFile* file_;
     const Execution* execution_;
     std::vector<char> buffer_;
-    std::int64_t bufferStart_ = 0;   // offset in the file of the buffer's first byte
+    std::int64_t bufferStart_ = 0;  // offset in the file of the buffer's first byte
 };
 
-/// Throws IoError at once when a file could not be written at `path`: missing directory, a directory or device of this name, no
-/// permission. Call it before long work.
+/// Throws IoError at once when a file could not be written at `path`: missing directory, a directory or
+/// device of this name, no permission. Call it before long work.
 void checkWritable(const std::string& path);
 
 /// Writes a whole small file atomically. Throws IoError.
 void writeFileAtomically(const std::string& path, const std::string& bytes);
 
-/// Unlinks every temporary file that is open now. Async-signal-safe: for handlers of signals that end the process.
+/// Unlinks every temporary file that is open now. Async-signal-safe: for handlers of signals that end the
+/// process.
 void removeTemporaryFiles() noexcept;
 
 }  // namespace tessera

@@ -12,7 +12,8 @@ inline constexpr int kGlyphWidth = 5;
 inline constexpr int kGlyphHeight = 7;
 inline constexpr int kGlyphAdvance = kGlyphWidth + 1;
 
-/// Rows of a character from the top, bit 4 is the leftmost pixel. A code that has no glyph gives an empty frame.
+/// Rows of a character from the top, bit 4 is the leftmost pixel. A code that has no glyph gives an empty
+/// frame.
 std::array<std::uint8_t, kGlyphHeight> glyphRows(char32_t code);
 
 /// The characters of UTF-8 text; a byte that is no part of one counts as one unknown character.

@@ -7,7 +7,8 @@
 namespace tessera {
 namespace {
 
-// Every step is a bijection of the lane for a fixed word, and of the word for a fixed lane, so a changed word changes the result.
+// Every step is a bijection of the lane for a fixed word, and of the word for a fixed lane, so a changed word
+// changes the result.
 std::uint64_t finish(std::uint64_t x) {
     x ^= x >> 32;
     x *= 0x9fb21c651e98df25u;
@@ -48,14 +49,16 @@ std::string FileDigest::uuid() {
     const std::uint64_t low = finish(lanes_[1] ^ std::rotl(lanes_[0], 23));
     // RFC 9562: the version nibble is 8, the variant bits are 10; the other 122 bits are free.
     std::array<char, 37> text{};
-    std::snprintf(text.data(), text.size(), "%08x-%04x-8%03x-%04x-%012llx", unsigned(high >> 32), unsigned(high >> 16) & 0xffffu,
-                  unsigned(high) & 0xfffu, (unsigned(low >> 48) & 0x3fffu) | 0x8000u,
+    std::snprintf(text.data(), text.size(), "%08x-%04x-8%03x-%04x-%012llx", unsigned(high >> 32),
+                  unsigned(high >> 16) & 0xffffu, unsigned(high) & 0xfffu,
+                  (unsigned(low >> 48) & 0x3fffu) | 0x8000u,
                   static_cast<unsigned long long>(low & 0xffffffffffffu));
     return text.data();
 }
 
 bool isDigestUuid(const std::string& uuid) {
-    return uuid.size() == 36 && uuid[14] == '8' && (uuid[19] == '8' || uuid[19] == '9' || uuid[19] == 'a' || uuid[19] == 'b');
+    return uuid.size() == 36 && uuid[14] == '8' &&
+           (uuid[19] == '8' || uuid[19] == '9' || uuid[19] == 'a' || uuid[19] == 'b');
 }
 
 }  // namespace tessera

@@ -7,7 +7,8 @@
 
 namespace tessera {
 
-/// A digest of a byte stream, to notice damage (not tampering): a change is missed with a chance of about 2^-122.
+/// A digest of a byte stream, to notice damage (not tampering): a change is missed with a chance of about
+/// 2^-122.
 class FileDigest {
   public:
     /// Pieces may have any size; only the whole stream matters.
@@ -18,7 +19,7 @@ class FileDigest {
   private:
     void mixWord(std::uint64_t word);
     std::array<std::uint64_t, 2> lanes_{0x6a09e667f3bcc909u, 0xbb67ae8584caa73bu};
-    std::uint64_t pending_ = 0;   // bytes of an unfinished word, lowest first
+    std::uint64_t pending_ = 0;  // bytes of an unfinished word, lowest first
     std::uint64_t length_ = 0;
 };
 

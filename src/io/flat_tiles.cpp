@@ -30,7 +30,8 @@ const float* findExtension(const ExtensionPoints* extension, int channels, int l
     const ExtensionPoint wanted{p, level, 0};
     const auto found = std::lower_bound(extension->points.begin(), extension->points.end(), wanted, before);
     if (found == extension->points.end() || found->level != level || found->index != p) return nullptr;
-    TESSERA_CHECK(std::size_t(found->firstValue) + std::size_t(channels) <= extension->values.size(), "an extension point has its values");
+    TESSERA_CHECK(std::size_t(found->firstValue) + std::size_t(channels) <= extension->values.size(),
+                  "an extension point has its values");
     return extension->values.data() + found->firstValue;
 }
 
@@ -51,9 +52,14 @@ struct TileOfLeaf {
 
 class FlatSampler {
   public:
-    FlatSampler(const BrickTree& tree, BrickStore& store, const Reconstruction* reconstruction, const ExtensionPoints* extension,
-                int level, const Execution& execution)
-        : tree_(tree), store_(store), reconstruction_(reconstruction), extension_(extension), level_(level), execution_(execution) {}
+    FlatSampler(const BrickTree& tree, BrickStore& store, const Reconstruction* reconstruction,
+                const ExtensionPoints* extension, int level, const Execution& execution)
+        : tree_(tree),
+          store_(store),
+          reconstruction_(reconstruction),
+          extension_(extension),
+          level_(level),
+          execution_(execution) {}
 
     void run(const TileBatchSink& sink) {
         const std::span<const BrickKey> leaves = tree_.leaves();
@@ -68,8 +74,10 @@ class FlatSampler {
                 (touchesCoarser(key) ? borders : equal).push_back(leaf);
             }
         }
-        TESSERA_CHECK(reconstruction_ || equal.size() == leaves.size(), "several levels need a reconstruction");
-        // Everything that reads samples of other bricks comes first; after that tiles can go as soon as they are written.
+        TESSERA_CHECK(reconstruction_ || equal.size() == leaves.size(),
+                      "several levels need a reconstruction");
+        // Everything that reads samples of other bricks comes first; after that tiles can go as soon as they
+        // are written.
         sampleCoarser(coarser, sink);
         sampleFiner(finer, sink);
         sampleBorders(borders, sink);
@@ -82,13 +90,13 @@ class FlatSampler {
   private:
     // Corner values of a coarse brick's closed box.
     struct Corners {
-        std::vector<double> values;        // channel by channel
-        std::vector<std::uint8_t> state;   // 0: no value, 1: covered, 2: extended
+        std::vector<double> values;       // channel by channel
+        std::vector<std::uint8_t> state;  // 0: no value, 1: covered, 2: extended
     };
     // One tile still to be sampled from a coarse brick.
     struct CoarseTile {
         std::size_t leaf;
-        std::size_t corners;   // position in the batch
+        std::size_t corners;  // position in the batch
         Vec3i origin;
     };
 
@@ -142,14 +150,16 @@ class FlatSampler {
             execution_.throwIfCancelled();
             const std::size_t end = std::min(tiles.size(), begin + kBatchTiles);
             batch.clear();
-            for (std::size_t i = begin; i < end; ++i) batch.push_back(borrowTile(*store_.tile(tiles[i].leaf, tiles[i].tile), tileOrigin(tiles[i])));
+            for (std::size_t i = begin; i < end; ++i)
+                batch.push_back(borrowTile(*store_.tile(tiles[i].leaf, tiles[i].tile), tileOrigin(tiles[i])));
             sink(batch);
             for (std::size_t i = begin; i < end; ++i) store_.release(tiles[i].leaf, tiles[i].tile);
         }
     }
 
   private:
-    // Bricks of the grid's level with a coarser neighbour: the points on the common border take the coarse brick's interpolation.
+    // Bricks of the grid's level with a coarser neighbour: the points on the common border take the coarse
+    // brick's interpolation.
     void sampleBorders(std::span<const std::size_t> leaves, const TileBatchSink& sink) {
         const std::vector<TileOfLeaf> tiles = storedTiles(leaves);
         for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchTiles) {
@@ -174,14 +184,16 @@ class FlatSampler {
             const bool onBorder = p.x == brickMin.x || p.y == brickMin.y || p.z == brickMin.z;
             if (!onBorder || !stored.covered(offset)) continue;
             for (int c = 0; c < store_.channels(); ++c)
-                tile.owned[std::size_t(c * kTilePoints + offset)] = float(reconstruction_->at(level_, p, c).value);
+                tile.owned[std::size_t(c * kTilePoints + offset)] =
+                    float(reconstruction_->at(level_, p, c).value);
         }
         return tile;
     }
 
     void sampleCoarser(std::span<const std::size_t> leaves, const TileBatchSink& sink) {
         for (std::size_t begin = 0; begin < leaves.size();) {
-            // Leaves are taken together until they fill a batch; a huge one is a batch of its own, given in parts.
+            // Leaves are taken together until they fill a batch; a huge one is a batch of its own, given in
+            // parts.
             std::size_t end = begin;
             std::vector<CoarseTile> tiles;
             while (end < leaves.size() && (end == begin || tiles.size() < kBatchTiles)) {
@@ -212,7 +224,8 @@ class FlatSampler {
         const int edge = tree_.brickCells() << shift;
         for (int x = 0; x < edge; x += kTileSize)
             for (int y = 0; y < edge; y += kTileSize)
-                for (int z = 0; z < edge; z += kTileSize) tiles.push_back({leaf, corners, origin + Vec3i(x, y, z)});
+                for (int z = 0; z < edge; z += kTileSize)
+                    tiles.push_back({leaf, corners, origin + Vec3i(x, y, z)});
     }
 
     Corners gatherCorners(std::size_t leaf) const {
@@ -230,12 +243,14 @@ class FlatSampler {
         return corners;
     }
 
-    void gatherCorner(std::size_t leaf, const Vec3i& p, const Vec3i& local, std::size_t i, std::size_t count, Corners& corners) const {
+    void gatherCorner(std::size_t leaf, const Vec3i& p, const Vec3i& local, std::size_t i, std::size_t count,
+                      Corners& corners) const {
         const int level = tree_.leaves()[leaf].level;
         const int cells = tree_.brickCells();
         if (const float* extended = findExtension(extension_, store_.channels(), level, p)) {
             corners.state[i] = 2;
-            for (int c = 0; c < store_.channels(); ++c) corners.values[std::size_t(c) * count + i] = double(extended[c]);
+            for (int c = 0; c < store_.channels(); ++c)
+                corners.values[std::size_t(c) * count + i] = double(extended[c]);
             return;
         }
         // An owned point keeps its exact coverage, also where its value comes from a still coarser brick.
@@ -265,10 +280,14 @@ class FlatSampler {
             const Vec3i q = first + Vec3i(offset >> 6, offset >> 3 & 7, offset & 7);
             const Vec3i cell(q.x >> shift, q.y >> shift, q.z >> shift);
             const Vec3i part(q.x & mask, q.y & mask, q.z & mask);
-            const std::size_t base = (std::size_t(cell.x) * std::size_t(edge) + std::size_t(cell.y)) * std::size_t(edge) + std::size_t(cell.z);
+            const std::size_t base =
+                (std::size_t(cell.x) * std::size_t(edge) + std::size_t(cell.y)) * std::size_t(edge) +
+                std::size_t(cell.z);
             // Along an axis without a fraction only the lower corner counts.
-            const std::size_t dx = part.x ? std::size_t(edge) * std::size_t(edge) : 0, dy = part.y ? std::size_t(edge) : 0, dz = part.z ? 1 : 0;
-            const std::size_t at[8] = {base, base + dz, base + dy, base + dy + dz, base + dx, base + dx + dz, base + dx + dy, base + dx + dy + dz};
+            const std::size_t dx = part.x ? std::size_t(edge) * std::size_t(edge) : 0,
+                              dy = part.y ? std::size_t(edge) : 0, dz = part.z ? 1 : 0;
+            const std::size_t at[8] = {base,      base + dz,      base + dy,      base + dy + dz,
+                                       base + dx, base + dx + dz, base + dx + dy, base + dx + dy + dz};
             int covered = 0, missing = 0;
             for (std::size_t corner : at) {
                 covered += corners.state[corner] == 1;
@@ -308,7 +327,8 @@ class FlatSampler {
             const BrickKey& key = tree_.leaves()[leaf];
             const int shift = level_ - key.level;
             const IndexBox box = tree_.ownedPoints(key);
-            const Vec3i low = floorDiv(box.min, kTileSize << shift), high = floorDiv(box.max - Vec3i(1), kTileSize << shift);
+            const Vec3i low = floorDiv(box.min, kTileSize << shift),
+                        high = floorDiv(box.max - Vec3i(1), kTileSize << shift);
             for (int x = low.x; x <= high.x; ++x)
                 for (int y = low.y; y <= high.y; ++y)
                     for (int z = low.z; z <= high.z; ++z) origins.push_back(Vec3i(x, y, z) * kTileSize);
@@ -335,7 +355,8 @@ class FlatSampler {
             if (!covered) continue;
             setBit(tile.coverage, offset);
             for (int c = 0; c < store_.channels(); ++c)
-                tile.owned[std::size_t(c * kTilePoints + offset)] = float(reconstruction_->at(key.level, fine, c).value);
+                tile.owned[std::size_t(c * kTilePoints + offset)] =
+                    float(reconstruction_->at(key.level, fine, c).value);
         }
         tile.active = tile.coverage;
         return tile;
@@ -364,12 +385,14 @@ int chooseFlatLevel(const BrickTree& tree, std::int64_t maxPoints) {
     return level;
 }
 
-void forEachFlatTile(const BrickTree& tree, BrickStore& store, const Reconstruction* reconstruction, const ExtensionPoints* extension,
-                     int level, const Execution& execution, const TileBatchSink& sink) {
+void forEachFlatTile(const BrickTree& tree, BrickStore& store, const Reconstruction* reconstruction,
+                     const ExtensionPoints* extension, int level, const Execution& execution,
+                     const TileBatchSink& sink) {
     FlatSampler(tree, store, reconstruction, extension, level, execution).run(sink);
 }
 
-void forEachLevelTile(const BrickTree& tree, BrickStore& store, int level, const Execution& execution, const TileBatchSink& sink) {
+void forEachLevelTile(const BrickTree& tree, BrickStore& store, int level, const Execution& execution,
+                      const TileBatchSink& sink) {
     std::vector<std::size_t> leaves;
     for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
         if (tree.leaves()[leaf].level == level) leaves.push_back(leaf);

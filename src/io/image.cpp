@@ -19,15 +19,18 @@ constexpr int kMargin = 14;
 constexpr int kTextScale = 2;
 constexpr int kBarWidth = 22;
 constexpr int kTicks = 5;
-constexpr int kSmallestHeight = 150;   // room for the ticks' labels
+constexpr int kSmallestHeight = 150;  // room for the ticks' labels
 constexpr Rgb kPaper{255, 255, 255}, kInk{40, 40, 40};
 
 // A colour of the CIE L*a*b* space (D65 white) in sRGB, not clamped: outside [0, 1] it can't be shown.
 std::array<double, 3> srgbFromLab(double lightness, double a, double b) {
-    const auto unpack = [](double t) { return t > 6.0 / 29 ? t * t * t : 3 * (6.0 / 29) * (6.0 / 29) * (t - 4.0 / 29); };
+    const auto unpack = [](double t) {
+        return t > 6.0 / 29 ? t * t * t : 3 * (6.0 / 29) * (6.0 / 29) * (t - 4.0 / 29);
+    };
     const double fy = (lightness + 16) / 116;
     const double x = 0.95047 * unpack(fy + a / 500), y = unpack(fy), z = 1.08883 * unpack(fy - b / 200);
-    const std::array<double, 3> linear{3.2404542 * x - 1.5371385 * y - 0.4985314 * z, -0.9692660 * x + 1.8760108 * y + 0.0415560 * z,
+    const std::array<double, 3> linear{3.2404542 * x - 1.5371385 * y - 0.4985314 * z,
+                                       -0.9692660 * x + 1.8760108 * y + 0.0415560 * z,
                                        0.0556434 * x - 0.2040259 * y + 1.0572252 * z};
     std::array<double, 3> srgb{};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -37,8 +40,8 @@ std::array<double, 3> srgbFromLab(double lightness, double a, double b) {
     return srgb;
 }
 
-// Lightness rises evenly from 15 to 90 while the hue turns from violet over blue and green to yellow; each colour is as strong as a screen can show,
-// up to a bound that keeps the steps of the hue even.
+// Lightness rises evenly from 15 to 90 while the hue turns from violet over blue and green to yellow; each
+// colour is as strong as a screen can show, up to a bound that keeps the steps of the hue even.
 Rgb computeColour(double share) {
     const double lightness = 15 + 75 * share;
     const double hue = (310 - 210 * std::pow(share, 0.9)) * std::acos(-1.0) / 180;
@@ -46,7 +49,8 @@ Rgb computeColour(double share) {
     std::array<double, 3> colour{};
     for (bool shown = false; !shown; chroma -= 0.5) {
         colour = srgbFromLab(lightness, chroma * std::cos(hue), chroma * std::sin(hue));
-        shown = chroma <= 0 || std::all_of(colour.begin(), colour.end(), [](double v) { return v >= 0 && v <= 1; });
+        shown = chroma <= 0 ||
+                std::all_of(colour.begin(), colour.end(), [](double v) { return v >= 0 && v <= 1; });
     }
     const auto byte = [](double v) { return std::uint8_t(std::lround(255 * std::clamp(v, 0.0, 1.0))); };
     return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
@@ -92,7 +96,9 @@ void drawText(RgbImage& image, int x, int y, const std::string& text) {
 }
 
 // A light check pattern tells "no value" from every colour of the map.
-Rgb emptyColour(int x, int y) { return (x / 6 + y / 6) % 2 ? Rgb{236, 236, 236} : Rgb{222, 222, 222}; }
+Rgb emptyColour(int x, int y) {
+    return (x / 6 + y / 6) % 2 ? Rgb{236, 236, 236} : Rgb{222, 222, 222};
+}
 
 struct ColourRange {
     double min = 0, max = 0;
@@ -130,12 +136,14 @@ std::vector<std::string> tickLabels(const ColourRange& range) {
     return labels;
 }
 
-void drawValues(RgbImage& canvas, int left, int top, const ScalarImage& image, const ColourRange& range, int magnify) {
+void drawValues(RgbImage& canvas, int left, int top, const ScalarImage& image, const ColourRange& range,
+                int magnify) {
     for (int y = 0; y < image.height * magnify; ++y)
         for (int x = 0; x < image.width * magnify; ++x) {
             const std::size_t i = image.offset(x / magnify, y / magnify);
             const double value = double(image.values[i]);
-            Rgb colour = image.coverage[i] && std::isfinite(value) ? mapColour(range.share(value)) : emptyColour(x, y);
+            Rgb colour =
+                image.coverage[i] && std::isfinite(value) ? mapColour(range.share(value)) : emptyColour(x, y);
             if (!image.outlines.empty() && image.outlines[i]) {
                 // Half way to white on dark colours and to black on light ones.
                 const bool dark = colour.r * 3 + colour.g * 6 + colour.b < 1100;
@@ -149,12 +157,14 @@ void drawValues(RgbImage& canvas, int left, int top, const ScalarImage& image, c
 void drawBar(RgbImage& canvas, int left, int top, int height, const std::vector<std::string>& labels) {
     fillBox(canvas, left - 1, top - 1, kBarWidth + 2, height + 2, kInk);
     for (int y = 0; y < height; ++y)
-        fillBox(canvas, left, top + y, kBarWidth, 1, mapColour(height > 1 ? 1 - double(y) / (height - 1) : 0.5));
+        fillBox(canvas, left, top + y, kBarWidth, 1,
+                mapColour(height > 1 ? 1 - double(y) / (height - 1) : 0.5));
     const int count = int(labels.size());
     for (int t = 0; t < count; ++t) {
         const int y = count == 1 ? top + height / 2 : top + (height - 1) * (count - 1 - t) / (count - 1);
         fillBox(canvas, left + kBarWidth + 1, y - 1, 5, 2, kInk);
-        const int textTop = std::clamp(y - kGlyphHeight * kTextScale / 2, top, top + height - kGlyphHeight * kTextScale);
+        const int textTop =
+            std::clamp(y - kGlyphHeight * kTextScale / 2, top, top + height - kGlyphHeight * kTextScale);
         drawText(canvas, left + kBarWidth + 10, textTop, labels[std::size_t(t)]);
     }
 }
@@ -173,18 +183,22 @@ Rgb mapColour(double share) {
 
 RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options) {
     const std::size_t pixels = std::size_t(image.width) * std::size_t(image.height);
-    TESSERA_CHECK(image.width > 0 && image.height > 0 && image.values.size() == pixels && image.coverage.size() == pixels,
+    TESSERA_CHECK(image.width > 0 && image.height > 0 && image.values.size() == pixels &&
+                      image.coverage.size() == pixels,
                   "a picture has a value and a coverage for every pixel");
-    TESSERA_CHECK(image.outlines.empty() || image.outlines.size() == pixels, "outlines have the picture's size");
+    TESSERA_CHECK(image.outlines.empty() || image.outlines.size() == pixels,
+                  "outlines have the picture's size");
     const int magnify = std::max(1, options.magnify);
     const ColourRange range = chooseRange(image, options);
     const std::vector<std::string> labels = tickLabels(range);
     int labelWidth = 0;
     for (const std::string& label : labels) labelWidth = std::max(labelWidth, textWidth(label));
     const int titleHeight = options.title.empty() ? 0 : kGlyphHeight * kTextScale + kMargin;
-    const int innerWidth = image.width * magnify, innerHeight = std::max(image.height * magnify, kSmallestHeight);
+    const int innerWidth = image.width * magnify,
+              innerHeight = std::max(image.height * magnify, kSmallestHeight);
     const int barLeft = kMargin + innerWidth + kMargin;
-    const int width = std::max(barLeft + kBarWidth + 10 + labelWidth, kMargin + textWidth(options.title)) + kMargin;
+    const int width =
+        std::max(barLeft + kBarWidth + 10 + labelWidth, kMargin + textWidth(options.title)) + kMargin;
     RgbImage canvas = blankImage(width, kMargin + titleHeight + innerHeight + kMargin, kPaper);
     const int top = kMargin + titleHeight;
     drawText(canvas, kMargin, kMargin, options.title);

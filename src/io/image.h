@@ -13,9 +13,10 @@ namespace tessera {
 struct ScalarImage {
     int width = 0;
     int height = 0;
-    std::vector<float> values;             ///< width x height
-    std::vector<std::uint8_t> coverage;    ///< width x height: 0 where the pixel has no value
-    std::vector<std::uint8_t> outlines;    ///< width x height, or empty: 1 where a brick's edge is drawn over it
+    std::vector<float> values;           ///< width x height
+    std::vector<std::uint8_t> coverage;  ///< width x height: 0 where the pixel has no value
+    std::vector<std::uint8_t>
+        outlines;  ///< width x height, or empty: 1 where a brick's edge is drawn over it
 
     std::size_t offset(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
 };
@@ -32,17 +33,18 @@ struct Rgb {
     friend bool operator==(const Rgb&, const Rgb&) = default;
 };
 
-/// Colour of a share in [0, 1] (clamped): dark blue over green to yellow, its lightness (CIE L*) rising evenly so that equal steps of the
-/// value look equally large, also in grey.
+/// Colour of a share in [0, 1] (clamped): dark blue over green to yellow, its lightness (CIE L*) rising
+/// evenly so that equal steps of the value look equally large, also in grey.
 Rgb mapColour(double share);
 
 struct PictureOptions {
-    std::string title;              ///< shown above the picture
-    double min = 0, max = 0;        ///< range of the colours; equal: the range of the finite values
-    int magnify = 1;                ///< picture pixels along a value's edge
+    std::string title;        ///< shown above the picture
+    double min = 0, max = 0;  ///< range of the colours; equal: the range of the finite values
+    int magnify = 1;          ///< picture pixels along a value's edge
 };
 
-/// The values in colours, a light pattern where there are none, the title, and a colour bar with five labelled ticks.
+/// The values in colours, a light pattern where there are none, the title, and a colour bar with five
+/// labelled ticks.
 RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options);
 
 /// Throws IoError; nothing stands at `path` until the file is whole.
@@ -52,16 +54,17 @@ void writeSlicePng(const std::string& path, const ScalarImage& image, const Pict
 
 /// An axis-parallel cut through the reconstruction.
 struct SliceOptions {
-    int axis = 2;                   ///< 0, 1, 2: the cut is normal to x, y or z
-    double positionWorld = 0;       ///< along that axis
-    int pixels = 800;               ///< along the longer edge of the picture
-    Box3d boundsWorld;              ///< what the picture shows; empty: all bricks
-    bool outlines = false;          ///< mark the edges of the bricks
+    int axis = 2;              ///< 0, 1, 2: the cut is normal to x, y or z
+    double positionWorld = 0;  ///< along that axis
+    int pixels = 800;          ///< along the longer edge of the picture
+    Box3d boundsWorld;         ///< what the picture shows; empty: all bricks
+    bool outlines = false;     ///< mark the edges of the bricks
 };
 
-/// Samples one channel on a cut. Its first axis runs to the right and its second up: (x, y) for z, (x, z) for y, (y, z) for x. A pixel has a
-/// value where the lattice point nearest to its centre is covered by the mesh. Throws InputError for options out of range.
-ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel, const SliceOptions& options,
-                        const Execution& execution);
+/// Samples one channel on a cut. Its first axis runs to the right and its second up: (x, y) for z, (x, z) for
+/// y, (y, z) for x. A pixel has a value where the lattice point nearest to its centre is covered by the mesh.
+/// Throws InputError for options out of range.
+ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel,
+                        const SliceOptions& options, const Execution& execution);
 
 }  // namespace tessera

@@ -25,6 +25,7 @@
 #include <new>
 
 #include "base/error.h"
+#include "io/open_check.h"
 #include "io/vtk_convert.h"
 #include "io/vtk_messages.h"
 #include "io/xml_check.h"
@@ -177,7 +178,10 @@ void update(const std::string& path, vtkAlgorithm* reader, const ReadOptions& op
 }
 
 void throwOnErrors(const std::string& path, const VtkMessages& messages) {
-    const std::vector<std::string> errors = messages.errors();
+    std::vector<std::string> errors = messages.errors();
+    // The legacy reader only warns when an array ends early.
+    for (const std::string& warning : messages.warnings())
+        if (warning.find("Error reading") != std::string::npos) errors.push_back(warning);
     if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
 }
 
@@ -196,6 +200,8 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     XmlFileInfo info;
     if (format == VtkFormat::xml) info = checkXmlFile(path);
     if (format == VtkFormat::legacy) checkLegacyFile(path);
+    if (format == VtkFormat::exodus) checkExodusFile(path);
+    if (format == VtkFormat::cgns) checkCgnsFile(path);
     const VtkMessages messages;
     OpenReader opened = open(path, format, info);
     std::vector<ArrayInfo> unread;

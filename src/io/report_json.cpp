@@ -11,7 +11,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json number(double value) {
+    return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
 
 Json numbers(const std::vector<double>& values) {
     Json list = Json::array();
@@ -41,7 +43,8 @@ Json fieldToJson(const FieldError& field) {
     json["relative_max"] = number(field.relativeMax);
     json["relative_p999"] = number(field.relativeP999);
     json["relative_rms"] = number(field.relativeRms);
-    json["worst_place"] = numbers({field.worstPlaceWorld.x, field.worstPlaceWorld.y, field.worstPlaceWorld.z});
+    json["worst_place"] =
+        numbers({field.worstPlaceWorld.x, field.worstPlaceWorld.y, field.worstPlaceWorld.z});
     json["samples"] = field.samples;
     json["skipped_samples"] = field.skippedSamples;
     json["valid_points"] = field.validPoints;

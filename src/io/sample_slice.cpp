@@ -38,10 +38,11 @@ void markOutlines(ScalarImage& image, const std::vector<std::int64_t>& leafOf) {
 
 }  // namespace
 
-ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel, const SliceOptions& options,
-                        const Execution& execution) {
+ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel,
+                        const SliceOptions& options, const Execution& execution) {
     if (options.axis < 0 || options.axis > 2) throw InputError("a slice's axis is 0, 1 or 2");
-    if (options.pixels < 1 || options.pixels > 16384) throw InputError("a slice has 1 to 16384 pixels along its longer edge");
+    if (options.pixels < 1 || options.pixels > 16384)
+        throw InputError("a slice has 1 to 16384 pixels along its longer edge");
     const Box3d bounds = options.boundsWorld.empty() ? boundsOf(tree) : options.boundsWorld;
     if (bounds.empty()) throw InputError("there are no bricks to slice");
     Frame frame;

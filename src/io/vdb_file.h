@@ -16,15 +16,16 @@ namespace tessera {
 
 enum class VdbLayout { levels, flat };
 
-/// How the mesh's axes become the file's: `y` makes the mesh's z axis the file's y axis, (x, z, -y); `z` makes the mesh's y axis the
-/// file's z axis, (x, -z, y). Grid transforms and vector values turn; voxel indices don't.
+/// How the mesh's axes become the file's: `y` makes the mesh's z axis the file's y axis, (x, z, -y); `z`
+/// makes the mesh's y axis the file's z axis, (x, -z, y). Grid transforms and vector values turn; voxel
+/// indices don't.
 enum class UpAxis { keep, y, z };
 
 /// How one field of the mesh is named and laid out in channels of the store.
 struct OutputField {
-    std::string name;           ///< grid name
-    std::string sourceName;     ///< field in the mesh
-    std::string location;       ///< "point" or "cell"
+    std::string name;        ///< grid name
+    std::string sourceName;  ///< field in the mesh
+    std::string location;    ///< "point" or "cell"
     int components = 1;
     int firstChannel = 0;
 };
@@ -34,50 +35,54 @@ struct VdbWriteOptions {
     bool halfFloat = false;
     float background = 0;
     UpAxis upAxis = UpAxis::keep;
-    double unitScale = 0;               ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
-    std::int64_t maxFlatVoxels = 0;     ///< flat: bound on points at the finest spacing; 0: 2^31
+    double unitScale =
+        0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
+    std::int64_t maxFlatVoxels = 0;  ///< flat: bound on points at the finest spacing; 0: 2^31
     std::string algorithm, criterion, sourceFile;
 };
 
 /// What was written.
 struct VdbWriteResult {
-    std::int64_t activeVoxels = 0;      ///< of all grids
+    std::int64_t activeVoxels = 0;  ///< of all grids
     std::int64_t fileBytes = 0;
-    int flatLevel = 0;                  ///< flat: the level whose spacing the grid has (above 0 when maxFlatVoxels capped it)
+    int flatLevel = 0;  ///< flat: the level whose spacing the grid has (above 0 when maxFlatVoxels capped it)
     double unitScale = 1;
-    std::vector<std::string> notes;     ///< sentences for the user: unit chosen, size capped
+    std::vector<std::string> notes;  ///< sentences for the user: unit chosen, size capped
 };
 
-/// Throws InputError when two grids would get the same name, or a field the name of the coverage mask. Call it before long work.
+/// Throws InputError when two grids would get the same name, or a field the name of the coverage mask. Call
+/// it before long work.
 void checkOutputFields(const std::vector<OutputField>& fields);
 
-/// Writes the samples (layout: docs/vdb_layout.md) and frees the store's tiles on the way. Nothing stands at `path` until the file is whole.
-/// Throws IoError (not writable, disk full), InputError (a unit that OpenVDB can't take, clashing names), Cancelled. The file depends on
-/// the arguments only: the same bytes for any number of threads.
+/// Writes the samples (layout: docs/vdb_layout.md) and frees the store's tiles on the way. Nothing stands at
+/// `path` until the file is whole. Throws IoError (not writable, disk full), InputError (a unit that OpenVDB
+/// can't take, clashing names), Cancelled. The file depends on the arguments only: the same bytes for any
+/// number of threads.
 /// @param extension may be null. @param reconstruction is needed for VdbLayout::flat only.
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
-                        const ExtensionPoints* extension, const Reconstruction* reconstruction, const VdbWriteOptions& options,
-                        const Execution& execution);
+                        const ExtensionPoints* extension, const Reconstruction* reconstruction,
+                        const VdbWriteOptions& options, const Execution& execution);
 
 /// A file read back.
 struct VdbFile {
     BrickTree tree;
-    BrickStore store;                   ///< levels layout only
+    BrickStore store;  ///< levels layout only
     std::vector<OutputField> fields;
-    ErrorReport report;                 ///< as stated in the file
+    ErrorReport report;  ///< as stated in the file
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
-    bool halfFloat = false;             ///< values were rounded to half floats
+    bool halfFloat = false;  ///< values were rounded to half floats
     float background = 0;
-    int flatLevel = 0;                  ///< flat: the level whose spacing the grids have
+    int flatLevel = 0;  ///< flat: the level whose spacing the grids have
     std::vector<std::string> gridNames;
-    std::vector<std::int64_t> gridVoxels;   ///< active voxels, one a grid
+    std::vector<std::int64_t> gridVoxels;  ///< active voxels, one a grid
 };
 
-/// Throws InputError when the file is missing, damaged, no VDB file, or not written by Tessera (`readVdbLattice` takes any VDB file).
-/// Points that are covered but not valid come back as NaN in all components of the field.
+/// Throws InputError when the file is missing, damaged, no VDB file, or not written by Tessera
+/// (`readVdbLattice` takes any VDB file). Points that are covered but not valid come back as NaN in all
+/// components of the field.
 VdbFile readVdb(const std::string& path);
 
 /// Origin and finest spacing of any VDB file's first grid, in world units, for --like.

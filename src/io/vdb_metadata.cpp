@@ -20,7 +20,9 @@ constexpr double kComfortableFileSpacing = 2e-5;
 constexpr int kMaxLevels = 31;
 constexpr int kMaxIndex = 1 << 30;
 
-[[noreturn]] void damaged(const std::string& what) { throw InputError("damaged Tessera metadata: " + what); }
+[[noreturn]] void damaged(const std::string& what) {
+    throw InputError("damaged Tessera metadata: " + what);
+}
 
 const std::string& entry(const std::map<std::string, std::string>& entries, const std::string& key) {
     const auto found = entries.find(key);
@@ -31,20 +33,24 @@ const std::string& entry(const std::map<std::string, std::string>& entries, cons
 double readDouble(const std::string& text, const std::string& key) {
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) damaged(key + " is '" + text + "', not a number");
+    if (error != std::errc() || end != text.data() + text.size())
+        damaged(key + " is '" + text + "', not a number");
     return value;
 }
 
 template <class Enum, std::size_t N>
-Enum readChoice(const std::string& text, const std::string& key, const std::array<std::pair<const char*, Enum>, N>& choices) {
+Enum readChoice(const std::string& text, const std::string& key,
+                const std::array<std::pair<const char*, Enum>, N>& choices) {
     for (const auto& [name, value] : choices) {
         if (text == name) return value;
     }
     damaged(key + " is '" + text + "'");
 }
 
-constexpr std::array<std::pair<const char*, VdbLayout>, 2> kLayouts{{{"levels", VdbLayout::levels}, {"flat", VdbLayout::flat}}};
-constexpr std::array<std::pair<const char*, UpAxis>, 3> kUpAxes{{{"keep", UpAxis::keep}, {"y", UpAxis::y}, {"z", UpAxis::z}}};
+constexpr std::array<std::pair<const char*, VdbLayout>, 2> kLayouts{
+    {{"levels", VdbLayout::levels}, {"flat", VdbLayout::flat}}};
+constexpr std::array<std::pair<const char*, UpAxis>, 3> kUpAxes{
+    {{"keep", UpAxis::keep}, {"y", UpAxis::y}, {"z", UpAxis::z}}};
 
 template <class Enum, std::size_t N>
 std::string choiceName(Enum value, const std::array<std::pair<const char*, Enum>, N>& choices) {
@@ -76,7 +82,8 @@ BrickTree decodeTree(const std::string& text) {
     const double spacing = json.at("spacing").get<double>();
     const int brickCells = json.at("brick_cells").get<int>();
     if (!(spacing > 0) || !std::isfinite(spacing)) damaged("the spacing of the bricks isn't positive");
-    if (brickCells != 8 && brickCells != 16 && brickCells != 32 && brickCells != 64) damaged("bricks of " + std::to_string(brickCells) + " cells");
+    if (brickCells != 8 && brickCells != 16 && brickCells != 32 && brickCells != 64)
+        damaged("bricks of " + std::to_string(brickCells) + " cells");
     const Json& levels = json.at("levels");
     if (levels.size() > kMaxLevels) damaged(std::to_string(levels.size()) + " levels");
     std::vector<BrickKey> leaves;
@@ -90,7 +97,8 @@ BrickTree decodeTree(const std::string& text) {
             key.level = int(level);
             for (int axis = 0; axis < 3; ++axis) {
                 const std::int64_t index = list[i + std::size_t(axis)].get<std::int64_t>();
-                if (index < -limit || index >= limit) damaged("brick index " + std::to_string(index) + " out of range");
+                if (index < -limit || index >= limit)
+                    damaged("brick index " + std::to_string(index) + " out of range");
                 key.index[axis] = int(index);
             }
             leaves.push_back(key);
@@ -129,7 +137,8 @@ std::vector<OutputField> decodeFields(const std::string& text) {
         entry.at("location").get_to(field.location);
         entry.at("components").get_to(field.components);
         entry.at("first_channel").get_to(field.firstChannel);
-        if (field.components < 1 || field.components > 64) damaged("a field of " + std::to_string(field.components) + " components");
+        if (field.components < 1 || field.components > 64)
+            damaged("a field of " + std::to_string(field.components) + " components");
         if (field.firstChannel != channels) damaged("the fields' channels don't follow each other");
         channels += field.components;
         fields.push_back(std::move(field));
@@ -159,23 +168,27 @@ std::string gridName(const std::string& base, VdbLayout layout, int level) {
 void checkOutputFields(const std::vector<OutputField>& fields) {
     std::set<std::string> names{"coverage"};
     for (const GridPlan& grid : planGrids(fields)) {
-        if (grid.name.empty()) throw InputError("a grid needs a name: give the field another with --field name=newname");
+        if (grid.name.empty())
+            throw InputError("a grid needs a name: give the field another with --field name=newname");
         // OpenVDB marks grids of equal names by this character, so it can't be part of one.
-        if (grid.name.find('\x1e') != std::string::npos) throw InputError("a grid's name can't hold the character 0x1e");
+        if (grid.name.find('\x1e') != std::string::npos)
+            throw InputError("a grid's name can't hold the character 0x1e");
         if (!names.insert(grid.name).second) {
-            throw InputError("two grids of the output would be named '" + grid.name + "': rename a field with --field " +
-                             grid.field + "=newname");
+            throw InputError("two grids of the output would be named '" + grid.name +
+                             "': rename a field with --field " + grid.field + "=newname");
         }
     }
 }
 
 double chooseUnitScale(double finestSpacingWorld, double requested) {
     if (requested != 0) {
-        if (!(requested > 0) || !std::isfinite(requested)) throw InputError("the unit scale must be a positive number");
+        if (!(requested > 0) || !std::isfinite(requested))
+            throw InputError("the unit scale must be a positive number");
         if (finestSpacingWorld * requested < kSmallestFileSpacing) {
             throw InputError("with unit scale " + exactText(requested) + " the finest voxel is " +
-                             exactText(finestSpacingWorld * requested) + " file units, and OpenVDB takes none below " +
-                             exactText(kSmallestFileSpacing) + ": give a larger --unit-scale");
+                             exactText(finestSpacingWorld * requested) +
+                             " file units, and OpenVDB takes none below " + exactText(kSmallestFileSpacing) +
+                             ": give a larger --unit-scale");
         }
         return requested;
     }
@@ -213,9 +226,12 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
 }
 
 VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
-    if (entries.find("tessera_format") == entries.end()) throw InputError("not written by Tessera (it has no tessera_format)");
+    if (entries.find("tessera_format") == entries.end())
+        throw InputError("not written by Tessera (it has no tessera_format)");
     const double format = readDouble(entry(entries, "tessera_format"), "tessera_format");
-    if (format != kVdbFormat) throw InputError("it has Tessera's format " + exactText(format) + ", this version reads " + std::to_string(kVdbFormat));
+    if (format != kVdbFormat)
+        throw InputError("it has Tessera's format " + exactText(format) + ", this version reads " +
+                         std::to_string(kVdbFormat));
     VdbMetadata metadata;
     metadata.version = entry(entries, "tessera_version");
     metadata.sourceFile = entry(entries, "tessera_source");

@@ -27,7 +27,9 @@ constexpr std::size_t kUuidBytes = 36;
 constexpr std::size_t kHeaderBytes = kUuidOffset + kUuidBytes;
 constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
 
-[[noreturn]] void refuse(const std::string& path, const std::string& why) { throw InputError(path + ": " + why); }
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw InputError(path + ": " + why);
+}
 
 // Whether the bytes are those that a Tessera wrote. Throws when they claim to be but aren't.
 bool checkBytes(const std::string& path) {
@@ -37,7 +39,8 @@ bool checkBytes(const std::string& path) {
     stream.read(bytes.data(), std::streamsize(bytes.size()));
     std::size_t got = std::size_t(stream.gcount());
     if (got == 0) refuse(path, "the file is empty, or not a file");
-    if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) refuse(path, "not a VDB file");
+    if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
+        refuse(path, "not a VDB file");
     const std::string uuid(bytes.data() + kUuidOffset, kUuidBytes);
     if (!isDigestUuid(uuid)) return false;
     std::memset(bytes.data() + kUuidOffset, '0', kUuidBytes);
@@ -47,7 +50,8 @@ bool checkBytes(const std::string& path) {
         stream.read(bytes.data(), std::streamsize(bytes.size()));
         got = std::size_t(stream.gcount());
     }
-    if (digest.uuid() != uuid) refuse(path, "the file is damaged or incomplete: its bytes don't match its digest");
+    if (digest.uuid() != uuid)
+        refuse(path, "the file is damaged or incomplete: its bytes don't match its digest");
     return true;
 }
 
@@ -66,7 +70,7 @@ void limitReader(std::uint64_t fileBytes) {
     const rlim_t seconds = 10 + rlim_t(fileBytes >> 20);
     const rlimit cpu{seconds, seconds};
     ::setrlimit(RLIMIT_CPU, &cpu);
-#ifndef __SANITIZE_ADDRESS__   // it reserves terabytes itself
+#ifndef __SANITIZE_ADDRESS__  // it reserves terabytes itself
     const rlim_t bytes = rlim_t(addressSpaceBytes() + (std::uint64_t(256) << 20) + 64 * fileBytes);
     const rlimit memory{bytes, bytes};
     ::setrlimit(RLIMIT_AS, &memory);
@@ -74,13 +78,14 @@ void limitReader(std::uint64_t fileBytes) {
     for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) ::signal(signal, SIG_DFL);
 }
 
-// OpenVDB trusts what it reads, so a damaged file can end the process or fill the memory. A file that no digest vouches for is read in a
-// child first, which may die.
+// OpenVDB trusts what it reads, so a damaged file can end the process or fill the memory. A file that no
+// digest vouches for is read in a child first, which may die.
 template <class Read>
 void tryInChild(const std::string& path, const Read& read) {
     const std::uint64_t fileBytes = std::filesystem::file_size(path);
     const pid_t child = ::fork();
-    if (child < 0) throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
+    if (child < 0)
+        throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
     if (child == 0) {
         limitReader(fileBytes);
         // These exceptions the parent gets again when it reads, and tells better.
@@ -97,8 +102,10 @@ void tryInChild(const std::string& path, const Read& read) {
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-    refuse(path, "the file is damaged: " + (WIFEXITED(status) ? std::string("a length in it is impossible")
-                                                             : "OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it"));
+    refuse(path, "the file is damaged: " +
+                     (WIFEXITED(status)
+                          ? std::string("a length in it is impossible")
+                          : "OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it"));
 }
 
 template <class Read>
@@ -122,7 +129,8 @@ auto guarded(const std::string& path, const Read& read) {
 std::map<std::string, std::string> textEntries(const openvdb::MetaMap& metadata) {
     std::map<std::string, std::string> entries;
     for (auto it = metadata.beginMeta(); it != metadata.endMeta(); ++it) {
-        if (it->second && it->second->typeName() == openvdb::StringMetadata::staticTypeName()) entries[it->first] = it->second->str();
+        if (it->second && it->second->typeName() == openvdb::StringMetadata::staticTypeName())
+            entries[it->first] = it->second->str();
     }
     return entries;
 }
@@ -145,7 +153,8 @@ void forEachTilePlace(const BrickTree& tree, int tilesPerEdge, int level, const 
         int tile = 0;
         for (int x = 0; x < tilesPerEdge; ++x)
             for (int y = 0; y < tilesPerEdge; ++y)
-                for (int z = 0; z < tilesPerEdge; ++z, ++tile) visit(leaf, tile, first + Vec3i(x, y, z) * kTileSize);
+                for (int z = 0; z < tilesPerEdge; ++z, ++tile)
+                    visit(leaf, tile, first + Vec3i(x, y, z) * kTileSize);
     }
 }
 
@@ -156,21 +165,24 @@ openvdb::Coord pointOf(const Vec3i& origin, int offset) {
 void readCoverage(const openvdb::BoolGrid& grid, int level, VdbFile& file) {
     openvdb::BoolGrid::ConstAccessor accessor = grid.getConstAccessor();
     std::uint64_t found = 0;
-    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level, [&](std::size_t leaf, int tile, const Vec3i& origin) {
-        std::array<std::uint64_t, 8> words{};
-        const openvdb::Coord first = pointOf(origin, 0);
-        if (const auto* node = accessor.probeConstLeaf(first)) {
-            for (openvdb::Index w = 0; w < 8; ++w) words[w] = node->getValueMask().getWord<openvdb::Index64>(w);
-        } else if (accessor.isValueOn(first)) {
-            // Another program merged the leaf node into a tile of its parent.
-            words.fill(~std::uint64_t(0));
-        }
-        std::uint64_t count = 0;
-        for (std::uint64_t word : words) count += std::uint64_t(std::popcount(word));
-        if (count > 0) file.store.ensureTile(leaf, tile).coverage = words;
-        found += count;
-    });
-    if (found != grid.activeVoxelCount()) throw InputError("grid " + grid.getName() + " covers points outside the bricks of its level");
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level,
+                     [&](std::size_t leaf, int tile, const Vec3i& origin) {
+                         std::array<std::uint64_t, 8> words{};
+                         const openvdb::Coord first = pointOf(origin, 0);
+                         if (const auto* node = accessor.probeConstLeaf(first)) {
+                             for (openvdb::Index w = 0; w < 8; ++w)
+                                 words[w] = node->getValueMask().getWord<openvdb::Index64>(w);
+                         } else if (accessor.isValueOn(first)) {
+                             // Another program merged the leaf node into a tile of its parent.
+                             words.fill(~std::uint64_t(0));
+                         }
+                         std::uint64_t count = 0;
+                         for (std::uint64_t word : words) count += std::uint64_t(std::popcount(word));
+                         if (count > 0) file.store.ensureTile(leaf, tile).coverage = words;
+                         found += count;
+                     });
+    if (found != grid.activeVoxelCount())
+        throw InputError("grid " + grid.getName() + " covers points outside the bricks of its level");
 }
 
 // Undoes the turn of the axes that the writer made.
@@ -183,20 +195,22 @@ openvdb::Vec3f turnedBack(const openvdb::Vec3f& v, UpAxis upAxis) {
 template <class Grid, class Put>
 void readValues(const Grid& grid, int level, VdbFile& file, const Put& put) {
     typename Grid::ConstAccessor accessor = grid.getConstAccessor();
-    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level, [&](std::size_t leaf, int tile, const Vec3i& origin) {
-        Tile* stored = file.store.tile(leaf, tile);
-        if (!stored) return;
-        for (int offset = 0; offset < kTilePoints; ++offset) {
-            if (!stored->covered(offset)) continue;
-            typename Grid::ValueType value;
-            const bool valid = accessor.probeValue(pointOf(origin, offset), value);
-            put(*stored, offset, valid, value);
-        }
-    });
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level,
+                     [&](std::size_t leaf, int tile, const Vec3i& origin) {
+                         Tile* stored = file.store.tile(leaf, tile);
+                         if (!stored) return;
+                         for (int offset = 0; offset < kTilePoints; ++offset) {
+                             if (!stored->covered(offset)) continue;
+                             typename Grid::ValueType value;
+                             const bool valid = accessor.probeValue(pointOf(origin, offset), value);
+                             put(*stored, offset, valid, value);
+                         }
+                     });
 }
 
 void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
-    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", VdbLayout::levels, level)), level, file);
+    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", VdbLayout::levels, level)),
+                 level, file);
     constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
     for (const GridPlan& plan : planGrids(file.fields)) {
         const std::string name = gridName(plan.name, VdbLayout::levels, level);
@@ -205,10 +219,11 @@ void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
         };
         if (plan.components == 3) {
             const auto grid = readTypedGrid<openvdb::Vec3SGrid>(source, name);
-            readValues(*grid, level, file, [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
-                const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
-                for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
-            });
+            readValues(*grid, level, file,
+                       [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
+                           const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
+                           for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
+                       });
         } else {
             const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
             readValues(*grid, level, file, [&](Tile& tile, int offset, bool valid, float value) {
@@ -222,8 +237,10 @@ void listGrids(openvdb::io::File& source, VdbFile& file) {
     const openvdb::GridPtrVecPtr grids = source.readAllGridMetadata();
     for (const openvdb::GridBase::Ptr& grid : *grids) {
         file.gridNames.push_back(grid->getName());
-        const auto count = grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT);
-        file.gridVoxels.push_back(count ? count->value() : std::int64_t(source.readGrid(grid->getName())->activeVoxelCount()));
+        const auto count =
+            grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT);
+        file.gridVoxels.push_back(count ? count->value()
+                                        : std::int64_t(source.readGrid(grid->getName())->activeVoxelCount()));
     }
 }
 
@@ -267,7 +284,9 @@ FixedFrame frameOfGrid(const std::string& path, const openvdb::GridBase& grid) {
             // The steps are differences of places, so they carry the rounding of the origin.
             const double slack = 1e-9 * spacing + 4e-16 * (std::abs(origin[row]) + spacing);
             if (!(std::abs(steps(row, column) - expected) <= slack))
-                refuse(path, name + " is turned or its voxels aren't cubes, so no lattice of bricks can be like it");
+                refuse(
+                    path,
+                    name + " is turned or its voxels aren't cubes, so no lattice of bricks can be like it");
         }
     }
     return {{origin.x(), origin.y(), origin.z()}, spacing};

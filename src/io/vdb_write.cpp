@@ -20,12 +20,15 @@ namespace {
 using FloatLeaf = openvdb::FloatTree::LeafNodeType;
 using Vec3fLeaf = openvdb::Vec3STree::LeafNodeType;
 using BoolLeaf = openvdb::BoolTree::LeafNodeType;
-static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints, "tiles are laid out as OpenVDB's leaf nodes");
+static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints,
+              "tiles are laid out as OpenVDB's leaf nodes");
 
-constexpr std::size_t kUuidOffset = 21;   // after magic, format, library's two version numbers and a flag
+constexpr std::size_t kUuidOffset = 21;  // after magic, format, library's two version numbers and a flag
 constexpr std::size_t kUuidBytes = 36;
 
-openvdb::Coord coord(const Vec3i& p) { return openvdb::Coord(p.x, p.y, p.z); }
+openvdb::Coord coord(const Vec3i& p) {
+    return openvdb::Coord(p.x, p.y, p.z);
+}
 
 // A vector's components in the file's axes.
 openvdb::Vec3f turned(const openvdb::Vec3f& v, UpAxis upAxis) {
@@ -34,12 +37,14 @@ openvdb::Vec3f turned(const openvdb::Vec3f& v, UpAxis upAxis) {
     return v;
 }
 
-openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, double unitScale, UpAxis upAxis) {
+openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, double unitScale,
+                                            UpAxis upAxis) {
     namespace math = openvdb::math;
     const Vec3d origin = tree.originWorld() * unitScale;
     const double spacing = tree.spacingWorld(level) * unitScale;
     if (upAxis == UpAxis::keep) {
-        const math::MapBase::Ptr map(new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
+        const math::MapBase::Ptr map(
+            new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
         return math::Transform::Ptr(new math::Transform(map));
     }
     // Rows: where an index step along x, y, z leads in the file, then the place of index (0, 0, 0).
@@ -64,14 +69,16 @@ FiniteMask finiteMask(const OutputTile& tile, int firstChannel, int components) 
         const float* values = tile.channel(c);
         for (std::size_t w = 0; w < 8; ++w) {
             std::uint64_t finite = 0;
-            for (std::size_t b = 0; b < 64; ++b) finite |= std::uint64_t(std::isfinite(values[w * 64 + b])) << b;
+            for (std::size_t b = 0; b < 64; ++b)
+                finite |= std::uint64_t(std::isfinite(values[w * 64 + b])) << b;
             mask.words[w] &= finite;
         }
     }
     for (int c = firstChannel; c < firstChannel + components; ++c) {
         const float* values = tile.channel(c);
         for (std::size_t i = 0; i < kTilePoints; ++i) {
-            if (mask.words[i >> 6] >> (i & 63) & 1) mask.largest = std::max(mask.largest, std::abs(values[i]));
+            if (mask.words[i >> 6] >> (i & 63) & 1)
+                mask.largest = std::max(mask.largest, std::abs(values[i]));
         }
     }
     return mask;
@@ -79,7 +86,8 @@ FiniteMask finiteMask(const OutputTile& tile, int firstChannel, int components) 
 
 template <class Leaf>
 void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
-    for (openvdb::Index w = 0; w < 8; ++w) leaf.getValueMask().template getWord<openvdb::Index64>(w) = words[w];
+    for (openvdb::Index w = 0; w < 8; ++w)
+        leaf.getValueMask().template getWord<openvdb::Index64>(w) = words[w];
 }
 
 // The grid of one plan at one level, or the coverage mask.
@@ -129,7 +137,8 @@ bool empty(const std::array<std::uint64_t, 8>& words) {
 
 class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
   public:
-    ScalarBuilder(int channel, float background) : BuilderOf(background), channel_(channel), background_(background) {}
+    ScalarBuilder(int channel, float background)
+        : BuilderOf(background), channel_(channel), background_(background) {}
 
     void makeLeaf(std::size_t position, const OutputTile& tile) override {
         const FiniteMask mask = finiteMask(tile, channel_, 1);
@@ -144,7 +153,8 @@ class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
         leaves_[position] = std::move(leaf);
         largest_[position] = mask.largest;
     }
-    void extend(const ExtensionPoints& extension, const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
+    void extend(const ExtensionPoints& extension,
+                const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
         openvdb::FloatGrid::Accessor accessor = grid_->getAccessor();
         for (const auto& [index, first] : points) {
             const float value = extension.values[first + std::size_t(channel_)];
@@ -162,14 +172,18 @@ class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
 class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
   public:
     VectorBuilder(int channel, float background, UpAxis upAxis)
-        : BuilderOf(openvdb::Vec3f(background)), channel_(channel), background_(background), upAxis_(upAxis) {}
+        : BuilderOf(openvdb::Vec3f(background)),
+          channel_(channel),
+          background_(background),
+          upAxis_(upAxis) {}
 
     void makeLeaf(std::size_t position, const OutputTile& tile) override {
         const FiniteMask mask = finiteMask(tile, channel_, 3);
         if (empty(mask.words)) return;
         auto leaf = std::make_unique<Vec3fLeaf>(coord(tile.origin), openvdb::Vec3f(background_));
         openvdb::Vec3f* values = leaf->buffer().data();
-        const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1), *z = tile.channel(channel_ + 2);
+        const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1),
+                    *z = tile.channel(channel_ + 2);
         for (std::size_t i = 0; i < kTilePoints; ++i) {
             if (mask.words[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
         }
@@ -177,7 +191,8 @@ class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
         leaves_[position] = std::move(leaf);
         largest_[position] = mask.largest;
     }
-    void extend(const ExtensionPoints& extension, const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
+    void extend(const ExtensionPoints& extension,
+                const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
         openvdb::Vec3SGrid::Accessor accessor = grid_->getAccessor();
         for (const auto& [index, first] : points) {
             const float* v = extension.values.data() + first + channel_;
@@ -209,7 +224,7 @@ class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
 // All grids of one level.
 struct LevelGrids {
     int level = 0;
-    std::vector<std::unique_ptr<GridBuilder>> builders;   // one a plan, then the coverage
+    std::vector<std::unique_ptr<GridBuilder>> builders;  // one a plan, then the coverage
 };
 
 LevelGrids makeBuilders(const std::vector<GridPlan>& plans, int level, const VdbWriteOptions& options) {
@@ -217,7 +232,8 @@ LevelGrids makeBuilders(const std::vector<GridPlan>& plans, int level, const Vdb
     grids.level = level;
     for (const GridPlan& plan : plans) {
         if (plan.components == 3) {
-            grids.builders.push_back(std::make_unique<VectorBuilder>(plan.firstChannel, options.background, options.upAxis));
+            grids.builders.push_back(
+                std::make_unique<VectorBuilder>(plan.firstChannel, options.background, options.upAxis));
         } else {
             grids.builders.push_back(std::make_unique<ScalarBuilder>(plan.firstChannel, options.background));
         }
@@ -237,21 +253,25 @@ void addTiles(LevelGrids& grids, std::span<const OutputTile> tiles, const Execut
                 [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
 }
 
-// Extension points that lie on the grid's lattice. In the flat layout a finer level's points count where they are points of the grid too.
-std::vector<std::pair<Vec3i, std::uint32_t>> pointsOnGrid(const ExtensionPoints& extension, VdbLayout layout, int level) {
+// Extension points that lie on the grid's lattice. In the flat layout a finer level's points count where they
+// are points of the grid too.
+std::vector<std::pair<Vec3i, std::uint32_t>> pointsOnGrid(const ExtensionPoints& extension, VdbLayout layout,
+                                                          int level) {
     std::vector<std::pair<Vec3i, std::uint32_t>> points;
     for (const ExtensionPoint& point : extension.points) {
         const int shift = level - point.level;
         if (shift < 0 || (shift > 0 && layout == VdbLayout::levels)) continue;
         const int mask = (1 << shift) - 1;
         if ((point.index.x & mask) || (point.index.y & mask) || (point.index.z & mask)) continue;
-        points.emplace_back(Vec3i(point.index.x >> shift, point.index.y >> shift, point.index.z >> shift), point.firstValue);
+        points.emplace_back(Vec3i(point.index.x >> shift, point.index.y >> shift, point.index.z >> shift),
+                            point.firstValue);
     }
     return points;
 }
 
-std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResult& result, const ExtensionPoints* extension,
-                                   const Reconstruction* reconstruction, const VdbWriteOptions& options, int flatLevel,
+std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResult& result,
+                                   const ExtensionPoints* extension, const Reconstruction* reconstruction,
+                                   const VdbWriteOptions& options, int flatLevel,
                                    const Execution& execution) {
     const bool flat = options.layout == VdbLayout::flat;
     std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
@@ -279,9 +299,12 @@ std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResu
 }
 
 // Half floats end at 65504 and lose digits below 6.1e-5.
-bool fitsHalf(float largest) { return largest == 0 || (largest <= 65504.0f && largest >= 6.2e-5f); }
+bool fitsHalf(float largest) {
+    return largest == 0 || (largest <= 65504.0f && largest >= 6.2e-5f);
+}
 
-void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickTree& tree, int level, double unitScale, UpAxis upAxis) {
+void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickTree& tree, int level,
+                  double unitScale, UpAxis upAxis) {
     grid.setName(name);
     grid.setTransform(makeTransform(tree, level, unitScale, upAxis));
     grid.insertMeta("tessera_level", openvdb::Int32Metadata(level));
@@ -290,8 +313,9 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
 }
 
 // Grids in the order of the file: field by field, each with its finest level first, then the coverage.
-openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans, const BrickTree& tree,
-                                 const VdbWriteOptions& options, VdbWriteResult& result) {
+openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
+                                 const BrickTree& tree, const VdbWriteOptions& options,
+                                 VdbWriteResult& result) {
     openvdb::GridCPtrVec ordered;
     for (std::size_t p = 0; p <= plans.size(); ++p) {
         const bool coverage = p == plans.size();
@@ -299,17 +323,22 @@ openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const st
         for (const LevelGrids& grids : levels) largest = std::max(largest, grids.builders[p]->largest());
         const bool half = !coverage && options.halfFloat && fitsHalf(largest);
         if (!coverage && options.halfFloat && !half) {
-            result.notes.push_back("grid " + plans[p].name + " is written in full floats: its largest magnitude " +
-                                   exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
+            result.notes.push_back(
+                "grid " + plans[p].name + " is written in full floats: its largest magnitude " +
+                exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
         }
         for (const LevelGrids& grids : levels) {
             openvdb::GridBase& grid = *grids.builders[p]->grid();
             const std::string base = coverage ? "coverage" : plans[p].name;
-            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, result.unitScale, options.upAxis);
+            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level,
+                         result.unitScale, options.upAxis);
             grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
             grid.setSaveFloatAsHalf(half);
-            if (!coverage) grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
-            if (!coverage && plans[p].components == 3) grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+            if (!coverage)
+                grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME
+                                                           : openvdb::GRID_UNKNOWN);
+            if (!coverage && plans[p].components == 3)
+                grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
             ordered.push_back(grids.builders[p]->grid());
         }
     }
@@ -323,13 +352,14 @@ class StreamArchive : public openvdb::io::Archive {
         setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
         setInstancingEnabled(false);
     }
-    void writeTo(std::ostream& stream, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) const {
+    void writeTo(std::ostream& stream, const openvdb::GridCPtrVec& grids,
+                 const openvdb::MetaMap& metadata) const {
         Archive::write(stream, grids, true, metadata);
     }
 };
 
-// OpenVDB draws a random UUID for every file. Ours is the digest of all other bytes: equal content gives equal files, and a reader can tell
-// whether a file is damaged before it trusts it.
+// OpenVDB draws a random UUID for every file. Ours is the digest of all other bytes: equal content gives
+// equal files, and a reader can tell whether a file is damaged before it trusts it.
 void stampDigest(AtomicFile& file, const Execution& execution) {
     std::array<char, kUuidBytes> blank;
     blank.fill('0');
@@ -347,8 +377,8 @@ void stampDigest(AtomicFile& file, const Execution& execution) {
     file.writeAt(kUuidOffset, uuid.data(), uuid.size());
 }
 
-void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids, const std::map<std::string, std::string>& entries,
-               const Execution& execution) {
+void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids,
+               const std::map<std::string, std::string>& entries, const Execution& execution) {
     openvdb::MetaMap metadata;
     for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
     metadata.insertMeta("creator", openvdb::StringMetadata("Tessera " + entries.at("tessera_version")));
@@ -364,8 +394,8 @@ void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids, const std::m
     stampDigest(file, execution);
 }
 
-VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result, const VdbWriteOptions& options,
-                         const VdbWriteResult& written) {
+VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
+                         const VdbWriteOptions& options, const VdbWriteResult& written) {
     VdbMetadata metadata;
     metadata.tree = result.tree;
     metadata.fields = fields;
@@ -387,24 +417,27 @@ void chooseFrame(const BrickTree& tree, const VdbWriteOptions& options, VdbWrite
     result.unitScale = chooseUnitScale(tree.spacingWorld(0), options.unitScale);
     if (options.unitScale == 0 && result.unitScale != 1) {
         result.notes.push_back("the finest voxel, " + exactText(tree.spacingWorld(0)) +
-                               " units, is smaller than OpenVDB takes: the file's unit is 1/" + exactText(result.unitScale) +
+                               " units, is smaller than OpenVDB takes: the file's unit is 1/" +
+                               exactText(result.unitScale) +
                                " of the mesh's (see tessera_unit_scale in the file)");
     }
     if (options.layout == VdbLayout::levels) return;
     const std::int64_t limit = options.maxFlatVoxels > 0 ? options.maxFlatVoxels : std::int64_t(1) << 31;
     result.flatLevel = chooseFlatLevel(tree, limit);
     if (result.flatLevel > 0) {
-        result.notes.push_back("the flat grid has spacing " + exactText(tree.spacingWorld(result.flatLevel)) + " instead of " +
-                               exactText(tree.spacingWorld(0)) + ": at the finest it would hold " +
-                               std::to_string(std::int64_t(flatPointCount(tree, 0))) + " voxels, the limit is " + std::to_string(limit));
+        result.notes.push_back("the flat grid has spacing " + exactText(tree.spacingWorld(result.flatLevel)) +
+                               " instead of " + exactText(tree.spacingWorld(0)) +
+                               ": at the finest it would hold " +
+                               std::to_string(std::int64_t(flatPointCount(tree, 0))) +
+                               " voxels, the limit is " + std::to_string(limit));
     }
 }
 
 }  // namespace
 
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
-                        const ExtensionPoints* extension, const Reconstruction* reconstruction, const VdbWriteOptions& options,
-                        const Execution& execution) {
+                        const ExtensionPoints* extension, const Reconstruction* reconstruction,
+                        const VdbWriteOptions& options, const Execution& execution) {
     checkOutputFields(fields);
     VdbWriteResult written;
     chooseFrame(result.tree, options, written);
@@ -412,10 +445,13 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
     openvdb::initialize();
     const std::vector<GridPlan> plans = planGrids(fields);
     for (const GridPlan& plan : plans)
-        TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(), "a field's channels are in the store");
-    std::vector<LevelGrids> levels = buildGrids(plans, result, extension, reconstruction, options, written.flatLevel, execution);
+        TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
+                      "a field's channels are in the store");
+    std::vector<LevelGrids> levels =
+        buildGrids(plans, result, extension, reconstruction, options, written.flatLevel, execution);
     const openvdb::GridCPtrVec grids = finishGrids(levels, plans, result.tree, options, written);
-    for (const openvdb::GridBase::ConstPtr& grid : grids) written.activeVoxels += std::int64_t(grid->activeVoxelCount());
+    for (const openvdb::GridBase::ConstPtr& grid : grids)
+        written.activeVoxels += std::int64_t(grid->activeVoxelCount());
     writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written)), execution);
     written.fileBytes = file.size();
     file.commit();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <optional>
 #include <string_view>
 
@@ -13,6 +14,8 @@ namespace tessera {
 namespace {
 
 constexpr std::string_view kSpaces = " \t\r\n";
+
+XmlFileInfo checkXmlFile(const std::string& path, int depth);
 
 std::string quoted(std::string_view text) {
     std::string result = "'";
@@ -57,7 +60,8 @@ std::int64_t countAttribute(const std::string& path, std::string_view tag, std::
     const std::size_t begin = std::min(text->find_first_not_of(kSpaces), text->size());
     std::int64_t value = -1;
     const auto result = std::from_chars(text->data() + begin, text->data() + text->size(), value);
-    if (result.ec != std::errc() || value < 0 || value > (std::int64_t(1) << 40))
+    const bool onlyDigits = text->find_first_not_of("0123456789 \t\r\n") == std::string_view::npos;
+    if (result.ec != std::errc() || !onlyDigits || value > (std::int64_t(1) << 40))
         throw InputError(path + ": byte " + std::to_string(byte) + ": " + std::string(name) + " is " + quoted(*text) +
                          ", expected a count");
     return value;
@@ -72,9 +76,21 @@ std::optional<double> unpackedBound(std::string_view root, std::size_t fileBytes
     return std::nullopt;
 }
 
-}  // namespace
+/// Checks the files that a parallel or multi-block file names.
+void checkPieces(const std::string& path, std::string_view text, std::string_view tagName, std::string_view attributeName,
+                 int depth) {
+    for (std::size_t at = text.find(tagName); at != std::string_view::npos; at = text.find(tagName, at + 1)) {
+        const auto name = attribute(text.substr(at, text.find('>', at) - at), attributeName);
+        if (!name || name->empty()) continue;
+        const auto piece = std::filesystem::path(path).parent_path() / std::string(*name);
+        if (!std::filesystem::exists(piece))
+            throw InputError(path + ": byte " + std::to_string(at) + ": names " + piece.string() + ", which doesn't exist");
+        checkXmlFile(piece.string(), depth + 1);
+    }
+}
 
-XmlFileInfo checkXmlFile(const std::string& path) {
+XmlFileInfo checkXmlFile(const std::string& path, int depth) {
+    if (depth > 8) throw InputError(path + ": files name each other more than 8 deep");
     const MappedFile file(path);
     std::string_view text = file.bytes();
     const std::size_t start = skipProlog(text, text.starts_with("\xef\xbb\xbf") ? 3 : 0);
@@ -105,6 +121,8 @@ XmlFileInfo checkXmlFile(const std::string& path) {
         info.points += countAttribute(path, tag, "NumberOfPoints", at);
         info.cells += countAttribute(path, tag, "NumberOfCells", at);
     }
+    if (info.type.starts_with("P")) checkPieces(path, markup, "<Piece", "Source", depth);
+    if (info.type.starts_with("vtk")) checkPieces(path, markup, "<DataSet", "file", depth);
     if (info.type != "UnstructuredGrid") return info;
     // A point takes 3 numbers and a cell a type, an offset and a node; each takes a byte at least.
     const auto bound = unpackedBound(root, text.size());
@@ -114,6 +132,10 @@ XmlFileInfo checkXmlFile(const std::string& path) {
                          " bytes can hold");
     return info;
 }
+
+}  // namespace
+
+XmlFileInfo checkXmlFile(const std::string& path) { return checkXmlFile(path, 0); }
 
 void checkLegacyFile(const std::string& path) {
     const MappedFile file(path);

@@ -29,6 +29,9 @@ inline constexpr int kLongRun = 8;
 inline constexpr double kUnit = 0x1p-53;
 /// An axis other than x is scanned when the element is this many times longer along it: rows along x are contiguous in memory.
 inline constexpr double kAxisGain = 4.0;
+/// Below this a step from voxel to voxel may be denormal; beyond that many steps a count isn't exact in float.
+inline constexpr float kDenormalSteps = 0x1p-96f;
+inline constexpr double kMostFloatSteps = 0x1p22;
 /// A scanline's first or last voxel may lie this far outside the element, in voxels.
 inline constexpr double kEndTolerance = 0x1p-26;
 /// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or everywhere.
@@ -59,7 +62,7 @@ struct alignas(64) BatchChannel {
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
     bool finite[kBatch];
-    bool tiny[kBatch];   // so small that a step from voxel to voxel would lose bits in float
+    bool inDouble[kBatch];   // a run's values don't come out right in float: denormal steps, or too many of them
     // Of the element and group of scanlines at work:
     alignas(64) double first[kBatch];   // value at the first voxel of each scanline's run
     float step;                         // difference from voxel to voxel
@@ -251,7 +254,8 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
         channel.low[lane] = low;
         channel.high[lane] = high;
         channel.finite[lane] = finite;
-        channel.tiny[lane] = std::max(std::fabs(low), std::fabs(high)) < 0x1p-96f;
+        channel.inDouble[lane] = std::max(std::fabs(low), std::fabs(high)) < kDenormalSteps ||
+                                 batch.maxS[lane] - batch.minS[lane] > kMostFloatSteps;
         if (!finite)
             for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
     }
@@ -283,10 +287,10 @@ HWY_INLINE float limited(float value, float low, float high) {
     return value > high ? high : value;
 }
 
-float valueAt(const BatchChannel& channel, int lane, int row, int step) {
+float valueAt(const BatchChannel& channel, int lane, int row, double step) {
     if (!channel.finite[lane]) return std::numeric_limits<float>::quiet_NaN();
-    const float value = channel.tiny[lane] ? float(channel.first[row] + double(step) * channel.gradientS[lane])
-                                           : float(channel.first[row]) + float(step) * channel.step;
+    const float value = channel.inDouble[lane] ? float(channel.first[row] + step * channel.gradientS[lane])
+                                               : float(channel.first[row]) + float(step) * channel.step;
     return limited(value, channel.low[lane], channel.high[lane]);
 }
 
@@ -322,7 +326,7 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
             ++walk.counts.contested;
             if (!contestPoint(walk.input, walk.output, walk.element, rankOf(walk, offset), offset)) continue;
         }
-        const int step = int(rows.skipped[row]) + k;
+        const double step = rows.skipped[row] + k;
         for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
             walk.output.values[c][offset] = valueAt(scratch.channels[c], walk.lane, row, step);
         }
@@ -348,7 +352,7 @@ HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped
 }
 
 HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
-    const int length = int(rows.length[row]), skipped = int(rows.skipped[row]);
+    const int length = int(rows.length[row]);
     const std::int64_t offset = std::int64_t(rows.offset[row]);
     std::int32_t* const owner = walk.output.owner + offset;
     const std::int64_t stride = walk.strideS;
@@ -363,11 +367,11 @@ HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
     for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
-        if (channel.finite[walk.lane] && !channel.tiny[walk.lane]) {
-            fillRun(out, stride, length, skipped, float(channel.first[row]), channel.step,
+        if (channel.finite[walk.lane] && !channel.inDouble[walk.lane]) {
+            fillRun(out, stride, length, int(rows.skipped[row]), float(channel.first[row]), channel.step,
                     channel.low[walk.lane], channel.high[walk.lane]);
         } else {
-            for (int k = 0; k < length; ++k) out[k * stride] = valueAt(channel, walk.lane, row, skipped + k);
+            for (int k = 0; k < length; ++k) out[k * stride] = valueAt(channel, walk.lane, row, rows.skipped[row] + k);
         }
     }
 }

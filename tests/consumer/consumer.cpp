@@ -19,7 +19,8 @@ int main() {
         tessera::refineAndResample(mesh, fields, tessera::findResampler("software"), options, {});
 
     const tessera::FieldError& error = result.report.fields.at(0);
-    std::printf("%lld covered points, largest error %g\n", static_cast<long long>(result.report.coveredPoints), error.max);
+    std::printf("%lld covered points, largest error %g\n",
+                static_cast<long long>(result.report.coveredPoints), error.max);
     // Trilinear interpolation is exact for a linear field, up to float rounding.
     return result.report.coveredPoints > 0 && error.max < 1e-6 ? 0 : 1;
 }
