@@ -257,6 +257,10 @@ class Interruption(AppTest):
         arguments = ["resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "500", "--threads", "1"]
         process = subprocess.Popen([TESSERA, *map(str, arguments)], cwd=self.folder, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.kill)
+        # On a busy machine loading the libraries takes a while; before main runs, a signal simply kills.
+        end = time.time() + 60
+        while time.time() < end and process.poll() is None and not catches(process.pid, signal.SIGTERM):
+            time.sleep(0.01)
         return process
 
     def finish(self, process, code):
@@ -284,6 +288,16 @@ class Interruption(AppTest):
         self.assertIsNone(process.poll(), "the run ended before it could be interrupted")
         process.send_signal(signal.SIGINT)
         self.finish(process, 130)
+
+
+def catches(pid, number):
+    """Whether the process has a handler for a signal."""
+    try:
+        status = pathlib.Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+    mask = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:")), "0")
+    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 def list_quietly(folder):

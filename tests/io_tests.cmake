@@ -1,4 +1,6 @@
 if(TESSERA_BUILD_IO)
-  tessera_test(vdb_file_test LINK io PRIVATE_LINK tessera_openvdb)
+  foreach(name vdb_file_test vdb_flat_test vdb_failure_test)
+    tessera_test(${name} LINK io PRIVATE_LINK tessera_openvdb)
+  endforeach()
   tessera_test(image_test LINK io PRIVATE_LINK PNG::PNG)
 endif()

@@ -17,7 +17,8 @@ namespace {
 
 using test::countFaceUsers;
 
-/// 4 x 4 determinant of homogeneous coordinates in rationals: another formula than that of the code under test.
+/// 4 x 4 determinant of homogeneous coordinates in rationals: another formula than that of the code under
+/// test.
 int referenceSign(const std::array<Vec3d, 4>& p) {
     mpq_class m[4][4];
     for (int i = 0; i < 4; ++i) {
@@ -39,10 +40,12 @@ int referenceSign(const std::array<Vec3d, 4>& p) {
             for (int k = column; k < 4; ++k) m[row][k] -= factor * m[column][k];
         }
     }
-    return -sign;   // rows 1 to 3 minus row 0 give the volume with this sign
+    return -sign;  // rows 1 to 3 minus row 0 give the volume with this sign
 }
 
-int signOf(const std::array<Vec3d, 4>& p) { return volumeSign(p[0], p[1], p[2], p[3]); }
+int signOf(const std::array<Vec3d, 4>& p) {
+    return volumeSign(p[0], p[1], p[2], p[3]);
+}
 
 TEST(VolumeSign, IsPositiveForTheUnitCorner) {
     EXPECT_EQ(signOf({Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, 1)}), 1);
@@ -62,7 +65,8 @@ TEST(VolumeSign, AgreesWithRationalsOnNearlyFlatTets) {
             for (int ulps = random.below(3); ulps > 0; --ulps)
                 p[3][k] = std::nextafter(p[3][k], random.below(2) ? 1e300 : -1e300);
         if (trial % 5 == 0)
-            for (Vec3d& q : p) q.z = double(float(q.x)) + double(float(q.y));   // often exactly flat after rounding
+            for (Vec3d& q : p)
+                q.z = double(float(q.x)) + double(float(q.y));  // often exactly flat after rounding
         const int expected = referenceSign(p);
         zeros += expected == 0;
         ASSERT_EQ(signOf(p), expected) << "trial " << trial;
@@ -133,7 +137,9 @@ TEST(BoundaryFaces, AreThoseThatOneElementUses) {
             std::sort(key.begin(), key.end());
             EXPECT_EQ(users.at(key), 1);
             for (const std::int32_t n : face.nodes)
-                EXPECT_EQ(std::count(mesh.tets[std::size_t(face.element)].begin(), mesh.tets[std::size_t(face.element)].end(), n), 1);
+                EXPECT_EQ(std::count(mesh.tets[std::size_t(face.element)].begin(),
+                                     mesh.tets[std::size_t(face.element)].end(), n),
+                          1);
         }
     }
 }
@@ -143,7 +149,8 @@ TEST(BoundaryFaces, LookOutwardForPositiveElements) {
     mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     mesh.tets = {{0, 1, 2, 3}};
     for (const BoundaryFace& face : boundaryFaces(mesh)) {
-        const Vec3d &a = mesh.points[std::size_t(face.nodes[0])], &b = mesh.points[std::size_t(face.nodes[1])],
+        const Vec3d &a = mesh.points[std::size_t(face.nodes[0])],
+                    &b = mesh.points[std::size_t(face.nodes[1])],
                     &c = mesh.points[std::size_t(face.nodes[2])];
         EXPECT_LT(volumeSign(a, b, c, Vec3d(0.1, 0.1, 0.1)), 0);
     }
@@ -152,7 +159,7 @@ TEST(BoundaryFaces, LookOutwardForPositiveElements) {
 TEST(BoundaryFaces, LeaveOutFlatElements) {
     TetMesh mesh;
     mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0}};
-    mesh.tets = {{0, 1, 2, 3}, {0, 1, 2, 4}};   // the second lies in the plane z = 0
+    mesh.tets = {{0, 1, 2, 3}, {0, 1, 2, 4}};  // the second lies in the plane z = 0
     const std::vector<BoundaryFace> faces = boundaryFaces(mesh);
     ASSERT_EQ(faces.size(), 4u);
     for (const BoundaryFace& face : faces) EXPECT_EQ(face.element, 0);
@@ -168,7 +175,8 @@ TEST(MeshQuality, CountsWhatIsWrong) {
     for (auto& tet : mesh.tets)
         if (test::signOf(mesh, &tet - mesh.tets.data()) < 0) std::swap(tet[0], tet[1]);
     const MeshQuality sound = measureQuality(mesh, {});
-    EXPECT_EQ(sound.flat + sound.inverted + sound.duplicate + sound.coincidentNodes + sound.nonConformingFaces, 0);
+    EXPECT_EQ(
+        sound.flat + sound.inverted + sound.duplicate + sound.coincidentNodes + sound.nonConformingFaces, 0);
     EXPECT_EQ(sound.boundaryFaces, 108);
     EXPECT_EQ(sound.innerFaces, (162 * 4 - 108) / 2);
     EXPECT_EQ(sound.smallestEdgeWorld, 1);
@@ -176,17 +184,18 @@ TEST(MeshQuality, CountsWhatIsWrong) {
     EXPECT_NEAR(sound.smallestVolumeWorld, 1.0 / 6, 1e-15);
     EXPECT_NEAR(sound.largestVolumeWorld, 1.0 / 6, 1e-15);
 
-    std::swap(mesh.tets[7][0], mesh.tets[7][1]);                             // inverted
-    mesh.tets.push_back({mesh.tets[20][2], mesh.tets[20][0], mesh.tets[20][1], mesh.tets[20][3]});   // duplicate
-    mesh.points.push_back(mesh.points[5]);                                   // coincident
-    mesh.points.push_back({-0.0, 0, 0});                                     // coincident with node 0
-    mesh.tets.push_back({0, 1, 2, 3});                                       // flat: a row of nodes
+    std::swap(mesh.tets[7][0], mesh.tets[7][1]);  // inverted
+    mesh.tets.push_back(
+        {mesh.tets[20][2], mesh.tets[20][0], mesh.tets[20][1], mesh.tets[20][3]});  // duplicate
+    mesh.points.push_back(mesh.points[5]);                                          // coincident
+    mesh.points.push_back({-0.0, 0, 0});                                            // coincident with node 0
+    mesh.tets.push_back({0, 1, 2, 3});                                              // flat: a row of nodes
     const MeshQuality quality = measureQuality(mesh, {});
     EXPECT_EQ(quality.flat, 1);
     EXPECT_EQ(quality.inverted, 1);
     EXPECT_EQ(quality.duplicate, 1);
     EXPECT_EQ(quality.coincidentNodes, 2);
-    EXPECT_GE(quality.nonConformingFaces, 1);   // faces of the duplicate have three users
+    EXPECT_GE(quality.nonConformingFaces, 1);  // faces of the duplicate have three users
 }
 
 TEST(MeshQuality, FindsHangingNodesAndStackedFaces) {
@@ -199,7 +208,8 @@ TEST(MeshQuality, FindsHangingNodesAndStackedFaces) {
 
     // The same face twice, with separate nodes.
     TetMesh stacked;
-    stacked.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}};
+    stacked.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                      {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}};
     stacked.tets = {{0, 1, 2, 3}, {4, 6, 5, 7}};
     EXPECT_EQ(measureQuality(stacked, {}).nonConformingFaces, 2);
     EXPECT_EQ(measureQuality(stacked, {}).coincidentNodes, 3);
@@ -208,7 +218,8 @@ TEST(MeshQuality, FindsHangingNodesAndStackedFaces) {
 TEST(MeshQuality, FirstNodeAtPlaceIsTheLowestIndex) {
     Random random(6);
     std::vector<Vec3d> points;
-    for (int i = 0; i < 3000; ++i) points.push_back(Vec3d(random.below(9), random.below(9), random.below(9)) / 3.0);
+    for (int i = 0; i < 3000; ++i)
+        points.push_back(Vec3d(random.below(9), random.below(9), random.below(9)) / 3.0);
     const std::vector<std::int32_t> first = firstNodeAtPlace(points, {});
     for (std::size_t i = 0; i < points.size(); ++i) {
         const auto expected = std::find(points.begin(), points.end(), points[i]) - points.begin();
@@ -300,7 +311,8 @@ TEST(NearestPoint, GivesTiesToTheLowestElement) {
         const NearestPoint nearest = one.find(p, 1e9);
         std::int32_t lowest = std::numeric_limits<std::int32_t>::max();
         for (const BoundaryFace& face : faces)
-            if (std::count(face.nodes.begin(), face.nodes.end(), node)) lowest = std::min(lowest, face.element);
+            if (std::count(face.nodes.begin(), face.nodes.end(), node))
+                lowest = std::min(lowest, face.element);
         if (nearest.distanceWorld == glm::distance(p, mesh.points[std::size_t(node)])) {
             EXPECT_EQ(nearest.element, lowest);
         }
@@ -316,7 +328,7 @@ TEST(NearestPoint, BlendsNodesAndTakesTheElementsOwnValue) {
     mesh.points = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}};
     mesh.tets = {{0, 1, 2, 3}};
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    const Field linear{"linear", FieldLocation::point, 2, {1, 0, 5, 0, 9, 0, nan, 0}};   // 1 + x + 2 y
+    const Field linear{"linear", FieldLocation::point, 2, {1, 0, 5, 0, 9, 0, nan, 0}};  // 1 + x + 2 y
     const Field cell{"cell", FieldLocation::cell, 1, {42}};
     const NearestPoint nearest = NearestPointIndex(mesh).find({1, 1, -3}, 10);
     EXPECT_EQ(nearest.distanceWorld, 3);
@@ -338,11 +350,12 @@ TEST(ElementIndex, FindsEveryElementWhoseBoxMeetsTheBox) {
             Box3d box;
             box.include(at);
             if (i % 3) box.include(at + 2.0 * random.place());
-            std::vector<std::int32_t> found{-7}, expected{-7};   // results are appended
+            std::vector<std::int32_t> found{-7}, expected{-7};  // results are appended
             index.query(box, found);
             for (std::int32_t e = 0; e < mesh.elementCount(); ++e) {
                 Box3d own;
-                for (const std::int32_t n : mesh.tets[std::size_t(e)]) own.include(mesh.points[std::size_t(n)]);
+                for (const std::int32_t n : mesh.tets[std::size_t(e)])
+                    own.include(mesh.points[std::size_t(n)]);
                 const bool apart = own.min.x > box.max.x || own.max.x < box.min.x || own.min.y > box.max.y ||
                                    own.max.y < box.min.y || own.min.z > box.max.z || own.max.z < box.min.z;
                 if (!apart) expected.push_back(e);

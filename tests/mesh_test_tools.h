@@ -40,8 +40,8 @@ inline double sumOfVolumes(const TetMesh& mesh) {
 
 inline int signOf(const TetMesh& mesh, std::int64_t e) {
     const auto& t = mesh.tets[std::size_t(e)];
-    return volumeSign(mesh.points[std::size_t(t[0])], mesh.points[std::size_t(t[1])], mesh.points[std::size_t(t[2])],
-                      mesh.points[std::size_t(t[3])]);
+    return volumeSign(mesh.points[std::size_t(t[0])], mesh.points[std::size_t(t[1])],
+                      mesh.points[std::size_t(t[2])], mesh.points[std::size_t(t[3])]);
 }
 
 inline std::int64_t countInverted(const TetMesh& mesh) {

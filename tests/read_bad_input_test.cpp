@@ -17,8 +17,10 @@ namespace {
 using test::TemporaryFolder;
 using test::VtuText;
 
-/// Reads a file that must be refused; the message holds the path and all the given words, in one line, and nothing was printed.
-void expectRefused(const std::string& path, const std::vector<std::string>& words, const ReadOptions& options = {}) {
+/// Reads a file that must be refused; the message holds the path and all the given words, in one line, and
+/// nothing was printed.
+void expectRefused(const std::string& path, const std::vector<std::string>& words,
+                   const ReadOptions& options = {}) {
     testing::internal::CaptureStdout();
     testing::internal::CaptureStderr();
     std::string message = "(it was read)";
@@ -35,7 +37,8 @@ void expectRefused(const std::string& path, const std::vector<std::string>& word
     EXPECT_TRUE(isInputError) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
     EXPECT_NE(message.find(std::filesystem::path(path).stem().string()), std::string::npos) << message;
-    for (const std::string& word : words) EXPECT_NE(message.find(word), std::string::npos) << "no '" << word << "' in: " << message;
+    for (const std::string& word : words)
+        EXPECT_NE(message.find(word), std::string::npos) << "no '" << word << "' in: " << message;
 }
 
 std::string contentOf(const std::string& path) {
@@ -105,17 +108,23 @@ TEST(BadXml, GarbageInsideIsRefused) {
     const std::string ascii = oneTet().text();
     expectRefused(folder.write("a.vtu", replaced(ascii, "<Points>", "<Points")), {});
     expectRefused(folder.write("b.vtu", replaced(ascii, "</Cells>", "")), {});
-    expectRefused(folder.write("c.vtu", replaced(ascii, "type=\"UnstructuredGrid\"", "type=\"Marshmallow\"")), {"Marshmallow"});
+    expectRefused(folder.write("c.vtu", replaced(ascii, "type=\"UnstructuredGrid\"", "type=\"Marshmallow\"")),
+                  {"Marshmallow"});
     expectRefused(folder.write("d.vtu", replaced(ascii, "type=\"UnstructuredGrid\"", "")), {"type"});
-    expectRefused(folder.write("e.vtu", replaced(ascii, "type=\"UnstructuredGrid\"", "type=\"PolyData\"")), {"PolyData"});
+    expectRefused(folder.write("e.vtu", replaced(ascii, "type=\"UnstructuredGrid\"", "type=\"PolyData\"")),
+                  {"PolyData"});
 }
 
 TEST(BadXml, CountsThatDoNotFitAreRefused) {
     const TemporaryFolder folder;
     const std::string ascii = oneTet().text();
     for (const char* count : {"-4", "4x", "1e3", "999999999999999999999", "1099511627776"})
-        expectRefused(folder.write("p.vtu", replaced(ascii, "NumberOfPoints=\"4\"", "NumberOfPoints=\"" + std::string(count) + "\"")), {});
-    expectRefused(folder.write("q.vtu", replaced(ascii, "NumberOfPoints=\"4\"", "NumberOfPoints=\"1000000000\"")), {"1000000000", "bytes"});
+        expectRefused(folder.write("p.vtu", replaced(ascii, "NumberOfPoints=\"4\"",
+                                                     "NumberOfPoints=\"" + std::string(count) + "\"")),
+                      {});
+    expectRefused(
+        folder.write("q.vtu", replaced(ascii, "NumberOfPoints=\"4\"", "NumberOfPoints=\"1000000000\"")),
+        {"1000000000", "bytes"});
     expectRefused(folder.write("r.vtu", replaced(ascii, "NumberOfPoints=\"4\"", "NumberOfPoints=\"5\"")), {});
     expectRefused(folder.write("s.vtu", replaced(ascii, "NumberOfCells=\"1\"", "NumberOfCells=\"2\"")), {});
     expectRefused(folder.write("t.vtu", replaced(ascii, ">\n1 2 3 4\n", ">\n1 2 3\n")), {});
@@ -154,7 +163,7 @@ TEST(BadXml, DamagedPolyhedraAreRefused) {
 TEST(BadGeometry, CoordinatesThatAreNotFiniteAreNamed) {
     const TemporaryFolder folder;
     VtuText vtu = oneTet();
-    vtu.points.insert(vtu.points.begin(), Vec3d(NAN));   // no cell uses it, so it does no harm
+    vtu.points.insert(vtu.points.begin(), Vec3d(NAN));  // no cell uses it, so it does no harm
     vtu.cells[0].nodes = {1, 2, 3, 4};
     vtu.pointArrays[0].values = "0 1 2 3 4";
     EXPECT_EQ(readMesh(folder.write("good.vtu", vtu.text()), {}, {}).mesh.nodeCount(), 4);
@@ -175,16 +184,20 @@ TEST(BadGeometry, MeshesWithoutSolidCellsAreRefused) {
     vtu = oneTet();
     vtu.cellArrays.push_back({"vtkGhostType", "UInt8", 1, "1"});
     expectRefused(folder.write("c.vtu", vtu.text()), {"no 3D cells", "1 blanked"});
-    expectRefused(folder.write("d.vtk", "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 4 1\n"
-                                        "ORIGIN 0 0 0\nSPACING 1 1 1\n"),
-                  {"no 3D cells"});
+    expectRefused(
+        folder.write("d.vtk",
+                     "# vtk DataFile Version 3.0\nt\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 4 4 1\n"
+                     "ORIGIN 0 0 0\nSPACING 1 1 1\n"),
+        {"no 3D cells"});
     vtu = oneTet();
     vtu.cells = {{10, {0, 0, 1, 2}}};
-    const MeshFile collapsed = readMesh(folder.write("e.vtu", [&] {
-        VtuText two = oneTet();
-        two.cells.push_back({10, {0, 0, 1, 2}});
-        return two.text();
-    }()), {}, {});
+    const MeshFile collapsed = readMesh(folder.write("e.vtu",
+                                                     [&] {
+                                                         VtuText two = oneTet();
+                                                         two.cells.push_back({10, {0, 0, 1, 2}});
+                                                         return two.text();
+                                                     }()),
+                                        {}, {});
     EXPECT_EQ(collapsed.mesh.elementCount(), 1);
     expectRefused(folder.write("f.vtu", vtu.text()), {"collapsed"});
 }
@@ -217,13 +230,16 @@ TEST(BadField, UnknownNamesListThoseThereAre) {
 TEST(BadLegacy, TruncatedAndGarbledFilesAreRefused) {
     const TemporaryFolder folder;
     const std::string text =
-        "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\n"
-        "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS f double 1\nLOOKUP_TABLE default\n1 2 3 4\n";
+        "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0 1 0 0 0 "
+        "1 0 0 0 1\n"
+        "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nSCALARS f double 1\nLOOKUP_TABLE default\n1 2 "
+        "3 4\n";
     EXPECT_EQ(readMesh(folder.write("good.vtk", text), {}, {}).mesh.elementCount(), 1);
     for (std::size_t length = 5; length < text.find("POINT_DATA") - 4; length += 5)
         expectRefused(folder.write("t.vtk", text.substr(0, length)), {});
     expectRefused(folder.write("u.vtk", text.substr(0, text.size() - 6)), {});
-    expectRefused(folder.write("v.vtk", replaced(text, "POINTS 4", "POINTS 4000000000")), {"POINTS 4000000000"});
+    expectRefused(folder.write("v.vtk", replaced(text, "POINTS 4", "POINTS 4000000000")),
+                  {"POINTS 4000000000"});
     expectRefused(folder.write("w.vtk", replaced(text, "4 0 1 2 3", "4 0 1 2 7")), {"cell 0", "index 7"});
     expectRefused(folder.write("x.vtk", replaced(text, "4 0 1 2 3", "9 0 1 2 3")), {});
     expectRefused(folder.write("y.vtk", replaced(text, "0 0 0 1 0", "0 0 zero 1 0")), {});
@@ -232,8 +248,10 @@ TEST(BadLegacy, TruncatedAndGarbledFilesAreRefused) {
 
 TEST(BadTetgen, TheLineIsNamed) {
     const TemporaryFolder folder;
-    const std::string nodes = "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n", elements = "1 4 0\n0 0 1 2 3\n";
-    const auto refuse = [&](const std::string& node, const std::string& element, const std::vector<std::string>& words) {
+    const std::string nodes = "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n",
+                      elements = "1 4 0\n0 0 1 2 3\n";
+    const auto refuse = [&](const std::string& node, const std::string& element,
+                            const std::vector<std::string>& words) {
         folder.write("m.node", node);
         folder.write("m.ele", element);
         expectRefused(folder.file("m.ele"), words);
@@ -257,13 +275,17 @@ TEST(BadTetgen, TheLineIsNamed) {
 TEST(BadPieces, AMissingPieceIsRefused) {
     const TemporaryFolder folder;
     folder.write("a.vtu", oneTet().text());
-    expectRefused(folder.write("all.pvtu",
-                               "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
-                               "<PUnstructuredGrid GhostLevel=\"0\"><PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>"
-                               "<Piece Source=\"a.vtu\"/><Piece Source=\"gone.vtu\"/></PUnstructuredGrid></VTKFile>\n"),
-                  {"gone.vtu"});
+    expectRefused(
+        folder.write("all.pvtu",
+                     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" "
+                     "byte_order=\"LittleEndian\">\n"
+                     "<PUnstructuredGrid GhostLevel=\"0\"><PPoints><PDataArray type=\"Float64\" "
+                     "NumberOfComponents=\"3\"/></PPoints>"
+                     "<Piece Source=\"a.vtu\"/><Piece Source=\"gone.vtu\"/></PUnstructuredGrid></VTKFile>\n"),
+        {"gone.vtu"});
     expectRefused(folder.write("all.vtm",
-                               "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>"
+                               "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" "
+                               "version=\"1.0\"><vtkMultiBlockDataSet>"
                                "<DataSet index=\"0\" file=\"a.vtu\"/><DataSet index=\"1\" file=\"gone.vtu\"/>"
                                "</vtkMultiBlockDataSet></VTKFile>\n"),
                   {"gone.vtu"});

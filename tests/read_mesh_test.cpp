@@ -45,7 +45,7 @@ TEST(BundledData, StokesSphere) {
     const MeshFile file = read(TESSERA_DATA_DIR "/freefem-stokes-sphere/stokes_p1.vtu");
     EXPECT_EQ(file.statistics.format, "VTK XML unstructured grid");
     EXPECT_EQ(file.statistics.cells, 18598);
-    EXPECT_EQ(file.statistics.skippedCells, 1156);   // boundary triangles
+    EXPECT_EQ(file.statistics.skippedCells, 1156);  // boundary triangles
     EXPECT_EQ(file.statistics.elements, 18598);
     EXPECT_EQ(file.statistics.nodes, 3306);
     EXPECT_EQ(file.statistics.boundaryFaces, 1156);
@@ -65,7 +65,7 @@ TEST(BundledData, CavityOfQuadraticTets) {
     const MeshFile file = read(TESSERA_DATA_DIR "/ccx-cavity/cavity.vtu");
     EXPECT_EQ(file.statistics.higherOrderCells, 25535);
     EXPECT_EQ(file.statistics.warnings.size(), 1u);
-    EXPECT_LT(file.statistics.nodes, 35069);   // nodes in the middle of edges are gone
+    EXPECT_LT(file.statistics.nodes, 35069);  // nodes in the middle of edges are gone
     EXPECT_EQ(field(file, "S").components, 6);
     EXPECT_NEAR(sumOfVolumes(file.mesh), 999999.999, 1e-3);
     EXPECT_NEAR(file.statistics.smallestVolumeWorld, 4.5878e-08, 1e-12);
@@ -93,8 +93,8 @@ TEST(BundledData, DiskOfHexahedra) {
 struct SharedMesh {
     const char* path;
     std::int64_t cells;
-    double volume;      // sum of |volumes|
-    double tolerance;   // relative
+    double volume;     // sum of |volumes|
+    double tolerance;  // relative
     std::int64_t inverted;
 };
 
@@ -113,26 +113,27 @@ TEST_P(SharedData, HasTheVolumeOfItsSource) {
 
 INSTANTIATE_TEST_SUITE_P(
     Meshes, SharedData,
-    testing::Values(SharedMesh{"bluntfin/bluntfin_tets.vtu", 187395, 931.162696, 1e-9, 0},
-                    SharedMesh{"bluntfin/bluntfin.vts", 37479, 931.162696, 1e-8, 0},
-                    SharedMesh{"cylinder-p1p2/CylinderLinear.vtu", 1522, 3.05608209e-05, 1e-8, 0},
-                    SharedMesh{"cylinder-p1p2/CylinderQuadratic.vtu", 1522, 3.05608209e-05, 1e-8, 0},
-                    SharedMesh{"freefem-stokes-sphere/stokes_p2.vtu", 18598, 1999.99949, 1e-8, 0},
-                    // Warped faces: the volume depends on their diagonals, by 0.4 % between OpenFOAM's and VTK's own.
-                    SharedMesh{"openfoam-igloo-poly/igloo_poly.vtu", 11401, 129.682873, 2e-3, -1},
-                    SharedMesh{"openfoam-igloo-poly/igloo_decomp.vtu", 42888, 129.682873, 2e-3, -1},
-                    SharedMesh{"svfsi-beam-tet10/result_100.vtu", 9670, 6.25, 1e-6, 9670},
-                    SharedMesh{"svfsi-pipe-flow/init_flow.vtu", 170694, 375.327157, 1e-8, 170694},
-                    SharedMesh{"ugawg-hemisphere-cylinder/hsc-gmsh-26-adapt.vtu", 102604, 1031424.83, 1e-8, 0},
-                    SharedMesh{"utah-torso/utahtorso-lowres.vtu", 51419, 34427214.1, 1e-8, 0},
-                    SharedMesh{"vtk-small/AngularSector.vtu", 7776, 0.00048837715, 1e-6, 0},
-                    SharedMesh{"vtk-small/QuadraticTetra.vtu", 96, 8, 1e-7, 0},
-                    SharedMesh{"vtk-small/Tetrahedron.vtu", 96, 8, 1e-7, 0},
-                    // 2 tets of 1/6, voxel and hex of 1, wedges of 1/2 (with VTK's inverted order), pyramids of 1/3.
-                    SharedMesh{"vtk-small/elements.vtu", 8, 4, 1e-7, 6},
-                    SharedMesh{"vtk-small/tetra.vtu", 1, 0.133333335, 1e-7, 0},
-                    SharedMesh{"vtk-small/tetraMesh.vtk", 160, 2359.722, 1e-6, 80},
-                    SharedMesh{"vtk-small/uGridEx.vtk", 4, 2.33333333, 1e-7, 0}),
+    testing::Values(
+        SharedMesh{"bluntfin/bluntfin_tets.vtu", 187395, 931.162696, 1e-9, 0},
+        SharedMesh{"bluntfin/bluntfin.vts", 37479, 931.162696, 1e-8, 0},
+        SharedMesh{"cylinder-p1p2/CylinderLinear.vtu", 1522, 3.05608209e-05, 1e-8, 0},
+        SharedMesh{"cylinder-p1p2/CylinderQuadratic.vtu", 1522, 3.05608209e-05, 1e-8, 0},
+        SharedMesh{"freefem-stokes-sphere/stokes_p2.vtu", 18598, 1999.99949, 1e-8, 0},
+        // Warped faces: the volume depends on their diagonals, by 0.4 % between OpenFOAM's and VTK's own.
+        SharedMesh{"openfoam-igloo-poly/igloo_poly.vtu", 11401, 129.682873, 2e-3, -1},
+        SharedMesh{"openfoam-igloo-poly/igloo_decomp.vtu", 42888, 129.682873, 2e-3, -1},
+        SharedMesh{"svfsi-beam-tet10/result_100.vtu", 9670, 6.25, 1e-6, 9670},
+        SharedMesh{"svfsi-pipe-flow/init_flow.vtu", 170694, 375.327157, 1e-8, 170694},
+        SharedMesh{"ugawg-hemisphere-cylinder/hsc-gmsh-26-adapt.vtu", 102604, 1031424.83, 1e-8, 0},
+        SharedMesh{"utah-torso/utahtorso-lowres.vtu", 51419, 34427214.1, 1e-8, 0},
+        SharedMesh{"vtk-small/AngularSector.vtu", 7776, 0.00048837715, 1e-6, 0},
+        SharedMesh{"vtk-small/QuadraticTetra.vtu", 96, 8, 1e-7, 0},
+        SharedMesh{"vtk-small/Tetrahedron.vtu", 96, 8, 1e-7, 0},
+        // 2 tets of 1/6, voxel and hex of 1, wedges of 1/2 (with VTK's inverted order), pyramids of 1/3.
+        SharedMesh{"vtk-small/elements.vtu", 8, 4, 1e-7, 6},
+        SharedMesh{"vtk-small/tetra.vtu", 1, 0.133333335, 1e-7, 0},
+        SharedMesh{"vtk-small/tetraMesh.vtk", 160, 2359.722, 1e-6, 80},
+        SharedMesh{"vtk-small/uGridEx.vtk", 4, 2.33333333, 1e-7, 0}),
     [](const auto& parameter) {
         std::string name = std::filesystem::path(parameter.param.path).filename().string();
         for (char& c : name)
@@ -182,13 +183,15 @@ VtuText twoTets() {
 TEST(ReadVtu, KeepsFieldsOfEveryNumericType) {
     const TemporaryFolder folder;
     VtuText vtu = twoTets();
-    const char* types[] = {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64"};
+    const char* types[] = {"Int8",   "UInt8", "Int16",  "UInt16",  "Int32",
+                           "UInt32", "Int64", "UInt64", "Float32", "Float64"};
     for (const char* type : types) vtu.pointArrays.push_back({type, type, 1, "1 2 3 4 5"});
     vtu.pointArrays.push_back({"nine", "Float64", 9, VtuText::numbers(45)});
     vtu.cellArrays.push_back({"region", "Int32", 1, "7 8"});
     vtu.cellArrays.push_back({"flow", "Float64", 3, "1 2 3 4 5 6"});
     const MeshFile file = read(folder.write("a.vtu", vtu.text()));
-    for (const char* type : types) EXPECT_EQ(field(file, type).values, (std::vector<double>{1, 2, 3, 4, 5})) << type;
+    for (const char* type : types)
+        EXPECT_EQ(field(file, type).values, (std::vector<double>{1, 2, 3, 4, 5})) << type;
     EXPECT_EQ(field(file, "nine").components, 9);
     EXPECT_EQ(field(file, "nine").at(4, 8), 44);
     EXPECT_EQ(field(file, "region").values, (std::vector<double>{7, 8}));
@@ -251,7 +254,7 @@ TEST(ReadVtu, LeavesOutGhostAndHiddenCells) {
     EXPECT_EQ(field(file, "c").values, std::vector<double>{6});
 
     vtu.cellArrays.erase(vtu.cellArrays.begin());
-    vtu.pointArrays.push_back({"vtkGhostType", "UInt8", 1, "2 0 0 0 0"});   // node 0 is hidden
+    vtu.pointArrays.push_back({"vtkGhostType", "UInt8", 1, "2 0 0 0 0"});  // node 0 is hidden
     file = read(folder.write("point.vtu", vtu.text()));
     EXPECT_EQ(field(file, "c").values, std::vector<double>{6});
 }
@@ -327,13 +330,15 @@ TEST(ReadPvtu, MergesPiecesAndLeavesOutGhosts) {
     for (Vec3d& p : b.points) p.x += 10;
     folder.write("a.vtu", a.text());
     folder.write("b.vtu", b.text());
-    const std::string path = folder.write(
-        "all.pvtu",
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\">\n"
-        "<PUnstructuredGrid GhostLevel=\"1\"><PPointData><PDataArray type=\"Float64\" Name=\"f\"/></PPointData>"
-        "<PCellData><PDataArray type=\"UInt8\" Name=\"vtkGhostType\"/></PCellData>"
-        "<PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>"
-        "<Piece Source=\"a.vtu\"/><Piece Source=\"b.vtu\"/></PUnstructuredGrid></VTKFile>\n");
+    const std::string path =
+        folder.write("all.pvtu",
+                     "<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" "
+                     "byte_order=\"LittleEndian\">\n"
+                     "<PUnstructuredGrid GhostLevel=\"1\"><PPointData><PDataArray type=\"Float64\" "
+                     "Name=\"f\"/></PPointData>"
+                     "<PCellData><PDataArray type=\"UInt8\" Name=\"vtkGhostType\"/></PCellData>"
+                     "<PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>"
+                     "<Piece Source=\"a.vtu\"/><Piece Source=\"b.vtu\"/></PUnstructuredGrid></VTKFile>\n");
     const MeshFile file = read(path);
     EXPECT_EQ(file.statistics.cells, 3);
     EXPECT_EQ(file.statistics.blankedCells, 1);
@@ -349,11 +354,12 @@ TEST(ReadMultiBlock, MergesBlocksAndFillsAbsentFields) {
     for (Vec3d& p : b.points) p.x += 10;
     folder.write("a.vtu", a.text());
     folder.write("b.vtu", b.text());
-    const std::string path = folder.write(
-        "all.vtm",
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>"
-        "<DataSet index=\"0\" file=\"a.vtu\"/><Block index=\"1\"><DataSet index=\"0\" file=\"b.vtu\"/></Block>"
-        "</vtkMultiBlockDataSet></VTKFile>\n");
+    const std::string path = folder.write("all.vtm",
+                                          "<?xml version=\"1.0\"?>\n<VTKFile type=\"vtkMultiBlockDataSet\" "
+                                          "version=\"1.0\"><vtkMultiBlockDataSet>"
+                                          "<DataSet index=\"0\" file=\"a.vtu\"/><Block index=\"1\"><DataSet "
+                                          "index=\"0\" file=\"b.vtu\"/></Block>"
+                                          "</vtkMultiBlockDataSet></VTKFile>\n");
     const MeshFile file = read(path);
     EXPECT_EQ(file.statistics.blocks, 2);
     EXPECT_EQ(file.mesh.elementCount(), 4);
@@ -383,21 +389,28 @@ TEST(ReadLegacy, ReadsEveryKindOfGrid) {
     expectCube("points.vtk", "DATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 1 2 3\nSPACING 1 2 3\n", 6);
     expectCube("grid.vtk", "DATASET STRUCTURED_GRID\nDIMENSIONS 2 2 2\nPOINTS 8 double\n" + cube, 1);
     expectCube("rectilinear.vtk",
-               "DATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 double\n0 4\nY_COORDINATES 2 double\n0 1\n"
+               "DATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 double\n0 4\nY_COORDINATES 2 "
+               "double\n0 1\n"
                "Z_COORDINATES 2 double\n1 2\n",
                4);
     expectCube("unstructured.vtk",
-               "DATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n" + cube + "CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n", 1);
+               "DATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n" + cube +
+                   "CELLS 1 9\n8 0 1 3 2 4 5 7 6\nCELL_TYPES 1\n12\n",
+               1);
 }
 
 TEST(ReadStructured, LeavesOutBlankedCells) {
     const TemporaryFolder folder;
-    const std::string path = folder.write(
-        "blank.vti",
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">"
-        "<ImageData WholeExtent=\"0 2 0 1 0 1\" Origin=\"0 0 0\" Spacing=\"1 1 1\"><Piece Extent=\"0 2 0 1 0 1\">"
-        "<PointData/><CellData><DataArray type=\"UInt8\" Name=\"vtkGhostType\" format=\"ascii\">0 32</DataArray>"
-        "<DataArray type=\"Float64\" Name=\"c\" format=\"ascii\">3 4</DataArray></CellData></Piece></ImageData></VTKFile>\n");
+    const std::string path =
+        folder.write("blank.vti",
+                     "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" "
+                     "byte_order=\"LittleEndian\" header_type=\"UInt64\">"
+                     "<ImageData WholeExtent=\"0 2 0 1 0 1\" Origin=\"0 0 0\" Spacing=\"1 1 1\"><Piece "
+                     "Extent=\"0 2 0 1 0 1\">"
+                     "<PointData/><CellData><DataArray type=\"UInt8\" Name=\"vtkGhostType\" "
+                     "format=\"ascii\">0 32</DataArray>"
+                     "<DataArray type=\"Float64\" Name=\"c\" format=\"ascii\">3 "
+                     "4</DataArray></CellData></Piece></ImageData></VTKFile>\n");
     const MeshFile file = read(path);
     EXPECT_EQ(file.statistics.cells, 1);
     EXPECT_EQ(file.statistics.blankedCells, 1);
@@ -411,10 +424,11 @@ TEST_P(ReadTetgen, ReadsBothIndexBasesFromEitherFile) {
     const int base = GetParam();
     const TemporaryFolder folder;
     const auto index = [&](int i) { return std::to_string(i + base) + " "; };
-    folder.write("m.node", "# made by hand\n\n5 3 2 1\n" + index(0) + "0 0 0 1.5 10 1\n" + index(1) + "1 0 0 2.5 20 1 # comment\n" +
-                               index(2) + " 0 1.0e0 0 3.5 30 0\n" + index(3) + "\t0 0 +1 4.5 40 0\r\n" + index(4) + "1 1 1 5.5 50 0");
-    folder.write("m.ele", "2 4 1\n" + index(0) + index(0) + index(1) + index(2) + index(3) + "7\n#\n" + index(1) + index(1) +
-                              index(2) + index(3) + index(4) + "-2\n");
+    folder.write("m.node", "# made by hand\n\n5 3 2 1\n" + index(0) + "0 0 0 1.5 10 1\n" + index(1) +
+                               "1 0 0 2.5 20 1 # comment\n" + index(2) + " 0 1.0e0 0 3.5 30 0\n" + index(3) +
+                               "\t0 0 +1 4.5 40 0\r\n" + index(4) + "1 1 1 5.5 50 0");
+    folder.write("m.ele", "2 4 1\n" + index(0) + index(0) + index(1) + index(2) + index(3) + "7\n#\n" +
+                              index(1) + index(1) + index(2) + index(3) + index(4) + "-2\n");
     for (const char* name : {"m.node", "m.ele"}) {
         const MeshFile file = read(folder.file(name));
         EXPECT_EQ(file.statistics.format, "TetGen");
@@ -430,7 +444,9 @@ INSTANTIATE_TEST_SUITE_P(Base, ReadTetgen, testing::Values(0, 1));
 
 TEST(ReadTetgen, ReadsTheCornersOfTenNodeElements) {
     const TemporaryFolder folder;
-    folder.write("q.node", "10 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 .5 .5 0\n6 0 .5 0\n7 .5 0 0\n8 0 0 .5\n9 .5 0 .5\n10 0 .5 .5\n");
+    folder.write("q.node",
+                 "10 3 0 0\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n5 .5 .5 0\n6 0 .5 0\n7 .5 0 0\n8 0 0 .5\n9 "
+                 ".5 0 .5\n10 0 .5 .5\n");
     folder.write("q.ele", "1 10 0\n1 1 2 3 4 5 6 7 8 9 10\n");
     const MeshFile file = read(folder.file("q.ele"));
     EXPECT_EQ(file.statistics.higherOrderCells, 1);
@@ -441,12 +457,18 @@ TEST(ReadTetgen, ReadsTheCornersOfTenNodeElements) {
 TEST(ReadEnSight, ReadsAsciiGold) {
     const TemporaryFolder folder;
     const std::string path = folder.write(
-        "m.case", "FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: m.geo\n\nVARIABLE\nscalar per node: T m.T\n");
-    folder.write("m.geo",
-                 "title\nmore\nnode id assign\nelement id assign\npart\n         1\nblock\ncoordinates\n         4\n"
-                 " 0.00000e+00\n 1.00000e+00\n 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 1.00000e+00\n 0.00000e+00\n"
-                 " 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 1.00000e+00\ntetra4\n         1\n         1         2         3         4\n");
-    folder.write("m.T", "temperature\npart\n         1\ncoordinates\n 1.00000e+00\n 2.00000e+00\n 3.00000e+00\n 4.00000e+00\n");
+        "m.case",
+        "FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: m.geo\n\nVARIABLE\nscalar per node: T m.T\n");
+    folder.write(
+        "m.geo",
+        "title\nmore\nnode id assign\nelement id assign\npart\n         1\nblock\ncoordinates\n         4\n"
+        " 0.00000e+00\n 1.00000e+00\n 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 1.00000e+00\n "
+        "0.00000e+00\n"
+        " 0.00000e+00\n 0.00000e+00\n 0.00000e+00\n 1.00000e+00\ntetra4\n         1\n         1         2    "
+        "     3         4\n");
+    folder.write("m.T",
+                 "temperature\npart\n         1\ncoordinates\n 1.00000e+00\n 2.00000e+00\n 3.00000e+00\n "
+                 "4.00000e+00\n");
     const MeshFile file = read(path);
     EXPECT_EQ(file.statistics.format, "EnSight");
     EXPECT_NEAR(sumOfVolumes(file.mesh), 1.0 / 6, 1e-7);
@@ -460,27 +482,32 @@ TEST(ReadOpenFoam, ReadsACaseWithItsLastTime) {
     std::filesystem::create_directories(folder.file("0"));
     std::filesystem::create_directories(folder.file("1"));
     const auto head = [](const std::string& kind, const std::string& object) {
-        return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind + ";\n    location \"\";\n    object " + object +
-               ";\n}\n";
+        return "FoamFile\n{\n    version 2.0;\n    format ascii;\n    class " + kind +
+               ";\n    location \"\";\n    object " + object + ";\n}\n";
     };
-    folder.write("system/controlDict", head("dictionary", "controlDict") +
-                                           "startTime 0;\nendTime 1;\ndeltaT 1;\nwriteInterval 1;\nwriteControl timeStep;\n");
+    folder.write("system/controlDict",
+                 head("dictionary", "controlDict") +
+                     "startTime 0;\nendTime 1;\ndeltaT 1;\nwriteInterval 1;\nwriteControl timeStep;\n");
     folder.write("constant/polyMesh/points",
                  head("vectorField", "points") +
-                     "12\n(\n(0 0 0)\n(1 0 0)\n(2 0 0)\n(0 1 0)\n(1 1 0)\n(2 1 0)\n(0 0 1)\n(1 0 1)\n(2 0 1)\n(0 1 1)\n(1 1 1)\n(2 1 1)\n)\n");
-    folder.write("constant/polyMesh/faces",
-                 head("faceList", "faces") +
-                     "11\n(\n4(1 4 10 7)\n4(0 6 9 3)\n4(0 1 7 6)\n4(3 9 10 4)\n4(0 3 4 1)\n4(6 7 10 9)\n4(2 5 11 8)\n4(1 2 8 7)\n"
-                     "4(4 10 11 5)\n4(1 4 5 2)\n4(7 8 11 10)\n)\n");
-    folder.write("constant/polyMesh/owner", head("labelList", "owner") + "11\n(\n0\n0\n0\n0\n0\n0\n1\n1\n1\n1\n1\n)\n");
+                     "12\n(\n(0 0 0)\n(1 0 0)\n(2 0 0)\n(0 1 0)\n(1 1 0)\n(2 1 0)\n(0 0 1)\n(1 0 1)\n(2 0 "
+                     "1)\n(0 1 1)\n(1 1 1)\n(2 1 1)\n)\n");
+    folder.write("constant/polyMesh/faces", head("faceList", "faces") +
+                                                "11\n(\n4(1 4 10 7)\n4(0 6 9 3)\n4(0 1 7 6)\n4(3 9 10 "
+                                                "4)\n4(0 3 4 1)\n4(6 7 10 9)\n4(2 5 11 8)\n4(1 2 8 7)\n"
+                                                "4(4 10 11 5)\n4(1 4 5 2)\n4(7 8 11 10)\n)\n");
+    folder.write("constant/polyMesh/owner",
+                 head("labelList", "owner") + "11\n(\n0\n0\n0\n0\n0\n0\n1\n1\n1\n1\n1\n)\n");
     folder.write("constant/polyMesh/neighbour", head("labelList", "neighbour") + "1\n(\n1\n)\n");
     folder.write("constant/polyMesh/boundary",
-                 head("polyBoundaryMesh", "boundary") + "1\n(\nwall\n{\n    type wall;\n    nFaces 10;\n    startFace 1;\n}\n)\n");
+                 head("polyBoundaryMesh", "boundary") +
+                     "1\n(\nwall\n{\n    type wall;\n    nFaces 10;\n    startFace 1;\n}\n)\n");
     for (const char* time : {"0", "1"})
-        folder.write(std::string(time) + "/T", head("volScalarField", "T") +
-                                                   "dimensions [0 0 0 1 0 0 0];\ninternalField nonuniform List<scalar>\n2\n(\n" +
-                                                   (time[0] == '0' ? "1\n2\n" : "30\n40\n") +
-                                                   ")\n;\nboundaryField\n{\nwall\n{\ntype zeroGradient;\n}\n}\n");
+        folder.write(std::string(time) + "/T",
+                     head("volScalarField", "T") +
+                         "dimensions [0 0 0 1 0 0 0];\ninternalField nonuniform List<scalar>\n2\n(\n" +
+                         (time[0] == '0' ? "1\n2\n" : "30\n40\n") +
+                         ")\n;\nboundaryField\n{\nwall\n{\ntype zeroGradient;\n}\n}\n");
     const MeshFile file = read(folder.write("case.foam", ""));
     EXPECT_EQ(file.statistics.format, "OpenFOAM");
     EXPECT_EQ(file.statistics.cells, 2);
@@ -508,9 +535,10 @@ TEST(WriteTets, ReadsBackBitForBit) {
 
 TEST(ListSeries, SortsNumbersByValue) {
     const TemporaryFolder folder;
-    for (const char* name : {"run_10.vtu", "run_2.vtu", "run_1.vtu", "run_007.vtu", "other.txt"}) folder.write(name, "x");
-    const std::vector<std::string> expected{folder.file("run_1.vtu"), folder.file("run_2.vtu"), folder.file("run_007.vtu"),
-                                            folder.file("run_10.vtu")};
+    for (const char* name : {"run_10.vtu", "run_2.vtu", "run_1.vtu", "run_007.vtu", "other.txt"})
+        folder.write(name, "x");
+    const std::vector<std::string> expected{folder.file("run_1.vtu"), folder.file("run_2.vtu"),
+                                            folder.file("run_007.vtu"), folder.file("run_10.vtu")};
     EXPECT_EQ(listSeries(folder.file("run_*.vtu")), expected);
     EXPECT_EQ(listSeries(folder.file("run_?.vtu")).size(), 2u);
     EXPECT_EQ(listSeries(folder.file("other.txt")), std::vector<std::string>{folder.file("other.txt")});
@@ -522,12 +550,15 @@ TEST(ListSeries, FollowsACollectionByTime) {
     const TemporaryFolder folder;
     folder.write("a & b.vtu", "x");
     folder.write("c.vtu", "x");
-    const std::string path = folder.write(
-        "s.pvd",
-        "<?xml version=\"1.0\"?><VTKFile type=\"Collection\" version=\"0.1\"><Collection>\n"
-        "<DataSet timestep=\"2.5\" part=\"0\" file=\"a &amp; b.vtu\"/>\n<DataSet timestep='1e-1' file='c.vtu'/></Collection></VTKFile>");
+    const std::string path =
+        folder.write("s.pvd",
+                     "<?xml version=\"1.0\"?><VTKFile type=\"Collection\" version=\"0.1\"><Collection>\n"
+                     "<DataSet timestep=\"2.5\" part=\"0\" file=\"a &amp; b.vtu\"/>\n<DataSet "
+                     "timestep='1e-1' file='c.vtu'/></Collection></VTKFile>");
     EXPECT_EQ(listSeries(path), (std::vector<std::string>{folder.file("c.vtu"), folder.file("a & b.vtu")}));
-    folder.write("bad.pvd", "<VTKFile type=\"Collection\"><Collection><DataSet file=\"gone.vtu\"/></Collection></VTKFile>");
+    folder.write(
+        "bad.pvd",
+        "<VTKFile type=\"Collection\"><Collection><DataSet file=\"gone.vtu\"/></Collection></VTKFile>");
     EXPECT_THROW(listSeries(folder.file("bad.pvd")), InputError);
 }
 

@@ -39,7 +39,7 @@ struct Grid {
             for (int j = 0; j <= n; ++j)
                 for (int i = 0; i <= n; ++i) {
                     Vec3d offset = shake * random.offset();
-                    if (i == 0 || i == n) offset.x = 0;   // the block stays a cube, so its volume is known
+                    if (i == 0 || i == n) offset.x = 0;  // the block stays a cube, so its volume is known
                     if (j == 0 || j == n) offset.y = 0;
                     if (k == 0 || k == n) offset.z = 0;
                     points.push_back(Vec3d(i, j, k) + offset);
@@ -48,8 +48,8 @@ struct Grid {
     std::int32_t node(int i, int j, int k) const { return std::int32_t((k * (n + 1) + j) * (n + 1) + i); }
     /// Corners of a cube in the order of VTK's hexahedron.
     std::array<std::int32_t, 8> hex(int i, int j, int k) const {
-        return {node(i, j, k),         node(i + 1, j, k),         node(i + 1, j + 1, k),         node(i, j + 1, k),
-                node(i, j, k + 1),     node(i + 1, j, k + 1),     node(i + 1, j + 1, k + 1),     node(i, j + 1, k + 1)};
+        return {node(i, j, k),     node(i + 1, j, k),     node(i + 1, j + 1, k),     node(i, j + 1, k),
+                node(i, j, k + 1), node(i + 1, j, k + 1), node(i + 1, j + 1, k + 1), node(i, j + 1, k + 1)};
     }
 };
 
@@ -67,26 +67,31 @@ std::vector<std::vector<std::int32_t>> hexFaces(const std::array<std::int32_t, 8
             {h[3], h[7], h[6], h[2]}, {h[0], h[3], h[2], h[1]}, {h[4], h[5], h[6], h[7]}};
 }
 
-/// Adds one cube as cells of the chosen sort; all sorts leave its six quads as faces, or triangles cut by the common rule.
+/// Adds one cube as cells of the chosen sort; all sorts leave its six quads as faces, or triangles cut by the
+/// common rule.
 void addCube(CellList& cells, std::vector<Vec3d>& points, const std::array<std::int32_t, 8>& h, int sort) {
     switch (sort) {
-        case 0: cells.add(CellKind::hex, h.data(), 8); break;
+        case 0:
+            cells.add(CellKind::hex, h.data(), 8);
+            break;
         case 1: {
             const std::int32_t voxel[] = {h[0], h[1], h[3], h[2], h[4], h[5], h[7], h[6]};
             cells.add(CellKind::voxel, voxel, 8);
             break;
         }
-        case 2: {   // six pyramids around the centre
+        case 2: {  // six pyramids around the centre
             Vec3d centre(0);
             for (const std::int32_t n : h) centre += points[std::size_t(n)] / 8.0;
             points.push_back(centre);
             for (const auto& face : hexFaces(h)) {
-                const std::int32_t pyramid[] = {face[0], face[3], face[2], face[1], std::int32_t(points.size() - 1)};
+                const std::int32_t pyramid[] = {face[0], face[3], face[2], face[1],
+                                                std::int32_t(points.size() - 1)};
                 cells.add(CellKind::pyramid, pyramid, 5);
             }
             break;
         }
-        default: addPolyhedron(cells, hexFaces(h));
+        default:
+            addPolyhedron(cells, hexFaces(h));
     }
 }
 
@@ -151,7 +156,8 @@ TEST(SplitCells, CutsWedgesIntoThreeTetsThatConform) {
 }
 
 TEST(SplitCells, CutsBlocksWithSeparateNodesAlike) {
-    // Every cube has its own copies of its nodes, in shuffled order; merging nodes by place afterwards must give a conforming mesh.
+    // Every cube has its own copies of its nodes, in shuffled order; merging nodes by place afterwards must
+    // give a conforming mesh.
     const Grid grid(5, 0.15, 5);
     Random random(6);
     std::vector<Vec3d> points;
@@ -161,7 +167,8 @@ TEST(SplitCells, CutsBlocksWithSeparateNodesAlike) {
             for (int i = 0; i < 5; ++i) {
                 const auto h = grid.hex(i, j, k);
                 std::array<std::int32_t, 8> own{}, order{0, 1, 2, 3, 4, 5, 6, 7};
-                for (int s = 7; s > 0; --s) std::swap(order[std::size_t(s)], order[std::size_t(random.below(s + 1))]);
+                for (int s = 7; s > 0; --s)
+                    std::swap(order[std::size_t(s)], order[std::size_t(random.below(s + 1))]);
                 for (const std::int32_t s : order) {
                     own[std::size_t(s)] = std::int32_t(points.size());
                     points.push_back(grid.points[std::size_t(h[std::size_t(s)])]);
@@ -299,7 +306,7 @@ TEST(SplitCells, SurvivesCollapsedCells) {
 }
 
 TEST(SplitCells, GivesTheSameForEveryNumberOfThreads) {
-    const Grid grid(20, 0.4, 9);   // so shaken that many cells need a centre
+    const Grid grid(20, 0.4, 9);  // so shaken that many cells need a centre
     CellList cells;
     std::vector<Vec3d> points = grid.points;
     for (int k = 0; k < 20; ++k)

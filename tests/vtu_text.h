@@ -38,13 +38,14 @@ struct VtuText {
     }
 
     static std::string array(const Array& a) {
-        return "<DataArray type=\"" + a.type + "\" Name=\"" + a.name + "\" NumberOfComponents=\"" + std::to_string(a.components) +
-               "\" format=\"ascii\">\n" + a.values + "\n</DataArray>\n";
+        return "<DataArray type=\"" + a.type + "\" Name=\"" + a.name + "\" NumberOfComponents=\"" +
+               std::to_string(a.components) + "\" format=\"ascii\">\n" + a.values + "\n</DataArray>\n";
     }
 
     std::string text() const {
         std::string coordinates, connectivity, offsets, types;
-        for (const Vec3d& p : points) coordinates += number(p.x) + " " + number(p.y) + " " + number(p.z) + "\n";
+        for (const Vec3d& p : points)
+            coordinates += number(p.x) + " " + number(p.y) + " " + number(p.z) + "\n";
         std::size_t offset = 0;
         for (const Cell& cell : cells) {
             for (const int node : cell.nodes) connectivity += std::to_string(node) + " ";
@@ -52,16 +53,19 @@ struct VtuText {
             types += std::to_string(cell.type) + " ";
         }
         std::string result =
-            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+            "byte_order=\"LittleEndian\" "
             "header_type=\"UInt64\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"" +
-            std::to_string(points.size()) + "\" NumberOfCells=\"" + std::to_string(cells.size()) + "\">\n<PointData>\n";
+            std::to_string(points.size()) + "\" NumberOfCells=\"" + std::to_string(cells.size()) +
+            "\">\n<PointData>\n";
         for (const Array& a : pointArrays) result += array(a);
         result += "</PointData>\n<CellData>\n";
         for (const Array& a : cellArrays) result += array(a);
-        result += "</CellData>\n<Points>\n" + array({"Points", "Float64", 3, coordinates}) + "</Points>\n<Cells>\n" +
-                  array({"connectivity", "Int64", 1, connectivity}) + array({"offsets", "Int64", 1, offsets}) +
-                  array({"types", "UInt8", 1, types});
-        if (!faces.empty()) result += array({"faces", "Int64", 1, faces}) + array({"faceoffsets", "Int64", 1, faceOffsets});
+        result += "</CellData>\n<Points>\n" + array({"Points", "Float64", 3, coordinates}) +
+                  "</Points>\n<Cells>\n" + array({"connectivity", "Int64", 1, connectivity}) +
+                  array({"offsets", "Int64", 1, offsets}) + array({"types", "UInt8", 1, types});
+        if (!faces.empty())
+            result += array({"faces", "Int64", 1, faces}) + array({"faceoffsets", "Int64", 1, faceOffsets});
         return result + "</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
     }
 };

@@ -65,6 +65,7 @@ int run(const CLI::App& app, const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    tessera::installInterruptHandlers();
     CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
     Arguments arguments;
     describe(app, arguments);
@@ -75,7 +76,6 @@ int main(int argc, char** argv) {
         printError(fmt::format("{} (tessera --help tells more)", error.what()).c_str());
         return kExitBadInput;
     }
-    tessera::installInterruptHandlers();
     try {
         return run(app, arguments);
     } catch (const tessera::Cancelled&) {

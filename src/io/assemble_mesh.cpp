@@ -46,7 +46,8 @@ void forEachNode(CellList& cells, const Execution& execution, const Visit& visit
     });
 }
 
-/// Drops the nodes that no cell uses and renumbers. Returns the old index of every node that stays; empty when all do.
+/// Drops the nodes that no cell uses and renumbers. Returns the old index of every node that stays; empty
+/// when all do.
 std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& block, std::size_t blockIndex,
                                           std::size_t blockCount, const Execution& execution) {
     std::vector<std::int32_t> newIndex(block.points.size(), -1);
@@ -78,11 +79,12 @@ template <class Index>
 void gatherTuples(Field& field, const std::vector<Index>& items, const Execution& execution) {
     const auto components = std::size_t(field.components);
     std::vector<double> values(items.size() * components);
-    parallelForChunks(execution, std::int64_t(items.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        for (auto i = std::size_t(begin); i < std::size_t(end); ++i)
-            for (std::size_t c = 0; c < components; ++c)
-                values[i * components + c] = field.values[std::size_t(items[i]) * components + c];
-    });
+    parallelForChunks(
+        execution, std::int64_t(items.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+            for (auto i = std::size_t(begin); i < std::size_t(end); ++i)
+                for (std::size_t c = 0; c < components; ++c)
+                    values[i * components + c] = field.values[std::size_t(items[i]) * components + c];
+        });
     field.values = std::move(values);
 }
 
@@ -104,7 +106,8 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
         cells += block.cells.kinds.size();
     }
     if (points > std::size_t(std::numeric_limits<std::int32_t>::max()))
-        throw InputError(path + ": has " + std::to_string(points) + " nodes; at most 2147483647 are possible");
+        throw InputError(path + ": has " + std::to_string(points) +
+                         " nodes; at most 2147483647 are possible");
     if (raw.blocks.size() == 1) return std::move(raw.blocks[0]);
 
     RawBlock all;
@@ -128,7 +131,8 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
             if (place == fieldOf.end()) {
                 place = fieldOf.emplace(key, all.fields.size()).first;
                 all.fields.push_back({field.name, field.location, field.components, {}});
-                all.fields.back().values.assign((atPoints ? points : cells) * std::size_t(field.components), kNan);
+                all.fields.back().values.assign((atPoints ? points : cells) * std::size_t(field.components),
+                                                kNan);
                 if ((atPoints ? pointBase : cellBase) > 0) partial.insert(key);
             }
             Field& target = all.fields[place->second];
@@ -145,7 +149,8 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
         block = {};
     }
     for (const auto& [location, name] : partial)
-        raw.statistics.warnings.push_back("Field '" + name + "' is absent in some blocks or has another number of " +
+        raw.statistics.warnings.push_back("Field '" + name +
+                                          "' is absent in some blocks or has another number of " +
                                           "components there; its values are NaN in these.");
     return all;
 }
@@ -158,8 +163,8 @@ void renameTwins(RawBlock& block, ImportStatistics& statistics) {
     for (Field& field : block.fields) {
         if (field.location != FieldLocation::cell || !pointNames.contains(field.name)) continue;
         const std::string name = cellFieldName(field.name);
-        statistics.warnings.push_back("Both points and cells have a field '" + field.name + "'; that of the cells is called '" +
-                                      name + "'.");
+        statistics.warnings.push_back("Both points and cells have a field '" + field.name +
+                                      "'; that of the cells is called '" + name + "'.");
         field.name = name;
     }
     for (ArrayInfo& array : block.arrays)
@@ -176,7 +181,8 @@ void selectFields(const std::string& path, RawBlock& block, const ReadOptions& o
         if (other.contains(name)) throw InputError(path + ": field '" + name + "' isn't numeric");
         std::string list;
         for (const std::string& there : available) list += (list.empty() ? "" : ", ") + there;
-        throw InputError(path + ": there is no field '" + name + "'; there are: " + (list.empty() ? "none" : list));
+        throw InputError(path + ": there is no field '" + name +
+                         "'; there are: " + (list.empty() ? "none" : list));
     }
     for (const ArrayInfo& array : block.arrays)
         if (array.components > 9 &&
@@ -231,12 +237,15 @@ void fillStatistics(const TetMesh& mesh, ImportStatistics& statistics, const Exe
 }
 
 bool isPureTets(const CellList& cells) {
-    return std::all_of(cells.kinds.begin(), cells.kinds.end(), [](CellKind kind) { return kind == CellKind::tet; });
+    return std::all_of(cells.kinds.begin(), cells.kinds.end(),
+                       [](CellKind kind) { return kind == CellKind::tet; });
 }
 
 }  // namespace
 
-std::string cellFieldName(const std::string& name) { return name + "_cell"; }
+std::string cellFieldName(const std::string& name) {
+    return name + "_cell";
+}
 
 bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location) {
     if (options.fields.empty()) return true;
@@ -246,19 +255,20 @@ bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation
     return asked(name) || (location == FieldLocation::cell && asked(cellFieldName(name)));
 }
 
-MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options, const Execution& execution) {
+MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options,
+                      const Execution& execution) {
     ImportStatistics& statistics = raw.statistics;
     statistics.blocks = std::int64_t(raw.blocks.size());
     statistics.cells = 0;
     for (const RawBlock& block : raw.blocks) statistics.cells += block.cells.cellCount();
     if (statistics.cells == 0)
         throw InputError(path + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
-                         " others: points, lines, surfaces or unknown; " + std::to_string(statistics.blankedCells) +
-                         " blanked or ghost cells)");
+                         " others: points, lines, surfaces or unknown; " +
+                         std::to_string(statistics.blankedCells) + " blanked or ghost cells)");
     if (statistics.higherOrderCells > 0)
-        statistics.warnings.push_back(std::to_string(statistics.higherOrderCells) + " of " +
-                                      std::to_string(statistics.cells) +
-                                      " cells are of higher order; they are read by their corner nodes only, as linear cells.");
+        statistics.warnings.push_back(
+            std::to_string(statistics.higherOrderCells) + " of " + std::to_string(statistics.cells) +
+            " cells are of higher order; they are read by their corner nodes only, as linear cells.");
     RawBlock block = mergeBlocks(path, raw, execution);
     renameTwins(block, statistics);
     selectFields(path, block, options);
@@ -268,7 +278,8 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     const bool pureTets = isPureTets(block.cells);
     SplitCells split = splitCells(block.points, block.cells, execution);
     if (std::int64_t(split.tets.size()) >= (std::int64_t(1) << 30))
-        throw InputError(path + ": gives " + std::to_string(split.tets.size()) + " tetrahedra; fewer than 2^30 are possible");
+        throw InputError(path + ": gives " + std::to_string(split.tets.size()) +
+                         " tetrahedra; fewer than 2^30 are possible");
     file.mesh.points = std::move(block.points);
     for (const AddedNode& node : split.addedNodes) file.mesh.points.push_back(node.point);
     statistics.addedNodes = std::int64_t(split.addedNodes.size());
@@ -282,7 +293,8 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     }
     file.mesh.tets = std::move(split.tets);
     if (file.mesh.tets.empty())
-        throw InputError(path + ": all cells are collapsed: none has four different nodes that span a tetrahedron");
+        throw InputError(path +
+                         ": all cells are collapsed: none has four different nodes that span a tetrahedron");
     fillStatistics(file.mesh, statistics, execution);
     file.statistics = std::move(statistics);
     return file;

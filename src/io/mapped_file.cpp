@@ -31,6 +31,8 @@ MappedFile::MappedFile(const std::string& path) {
     bytes_ = {static_cast<const char*>(memory), size};
 }
 
-MappedFile::~MappedFile() { ::munmap(const_cast<char*>(bytes_.data()), bytes_.size()); }
+MappedFile::~MappedFile() {
+    ::munmap(const_cast<char*>(bytes_.data()), bytes_.size());
+}
 
 }  // namespace tessera

@@ -5,7 +5,8 @@
 
 namespace tessera {
 
-/// A regular file as read-only memory. Throws InputError when it is missing, not a regular file, empty or not readable.
+/// A regular file as read-only memory. Throws InputError when it is missing, not a regular file, empty or not
+/// readable.
 class MappedFile {
   public:
     explicit MappedFile(const std::string& path);

@@ -14,7 +14,9 @@ namespace tessera {
 
 namespace {
 
-bool isDigit(char c) { return c >= '0' && c <= '9'; }
+bool isDigit(char c) {
+    return c >= '0' && c <= '9';
+}
 
 /// Order in which run_2 comes before run_10.
 bool naturallyBefore(const std::string& a, const std::string& b) {
@@ -36,7 +38,7 @@ bool naturallyBefore(const std::string& a, const std::string& b) {
         if (x != y) return x < y;
     }
     if (i < a.size() || j < b.size()) return j < b.size();
-    return a < b;   // only leading zeros differ
+    return a < b;  // only leading zeros differ
 }
 
 std::vector<std::string> expandPattern(const std::string& pattern) {
@@ -73,7 +75,8 @@ std::string attributeOf(std::string_view tag, std::string_view name) {
         next = tag.find_first_of("\"'", next);
         if (next == std::string_view::npos) return {};
         const std::size_t close = tag.find(tag[next], next + 1);
-        return close == std::string_view::npos ? std::string() : decodeEntities(tag.substr(next + 1, close - next - 1));
+        return close == std::string_view::npos ? std::string()
+                                               : decodeEntities(tag.substr(next + 1, close - next - 1));
     }
     return {};
 }
@@ -85,14 +88,16 @@ std::vector<std::string> readCollection(const std::string& path) {
     if (text.find("<VTKFile") == std::string_view::npos || text.find("<Collection") == std::string_view::npos)
         throw InputError(path + ": isn't a .pvd file: expected <VTKFile type=\"Collection\">");
     if (text.find("</VTKFile>") == std::string_view::npos)
-        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) + ": there is no </VTKFile>");
+        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) +
+                         ": there is no </VTKFile>");
     struct Step {
         double time;
         std::string file;
     };
     std::vector<Step> steps;
     const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-    for (std::size_t at = text.find("<DataSet"); at != std::string_view::npos; at = text.find("<DataSet", at + 1)) {
+    for (std::size_t at = text.find("<DataSet"); at != std::string_view::npos;
+         at = text.find("<DataSet", at + 1)) {
         const std::string_view tag = text.substr(at, text.find('>', at) - at);
         const std::string name = attributeOf(tag, "file");
         if (name.empty())
@@ -102,15 +107,18 @@ std::vector<std::string> readCollection(const std::string& path) {
         if (!timeText.empty()) {
             const auto result = std::from_chars(timeText.data(), timeText.data() + timeText.size(), time);
             if (result.ec != std::errc())
-                throw InputError(path + ": byte " + std::to_string(at) + ": timestep is '" + timeText + "', expected a number");
+                throw InputError(path + ": byte " + std::to_string(at) + ": timestep is '" + timeText +
+                                 "', expected a number");
         }
         steps.push_back({time, (folder / name).string()});
     }
     if (steps.empty()) throw InputError(path + ": names no files");
-    std::stable_sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) { return a.time < b.time; });
+    std::stable_sort(steps.begin(), steps.end(),
+                     [](const Step& a, const Step& b) { return a.time < b.time; });
     std::vector<std::string> files;
     for (Step& step : steps) {
-        if (!std::filesystem::exists(step.file)) throw InputError(path + ": names " + step.file + ", which doesn't exist");
+        if (!std::filesystem::exists(step.file))
+            throw InputError(path + ": names " + step.file + ", which doesn't exist");
         files.push_back(std::move(step.file));
     }
     return files;
@@ -121,10 +129,12 @@ std::vector<std::string> readCollection(const std::string& path) {
 std::vector<std::string> listSeries(const std::string& pathOrPattern) {
     std::error_code error;
     if (std::filesystem::exists(pathOrPattern, error)) {
-        if (pathOrPattern.ends_with(".pvd") || pathOrPattern.ends_with(".PVD")) return readCollection(pathOrPattern);
+        if (pathOrPattern.ends_with(".pvd") || pathOrPattern.ends_with(".PVD"))
+            return readCollection(pathOrPattern);
         return {pathOrPattern};
     }
-    if (pathOrPattern.find_first_of("*?") == std::string::npos) throw InputError(pathOrPattern + ": there is no such file");
+    if (pathOrPattern.find_first_of("*?") == std::string::npos)
+        throw InputError(pathOrPattern + ": there is no such file");
     return expandPattern(pathOrPattern);
 }
 

@@ -20,17 +20,19 @@ struct ArrayInfo {
 /// One block of a file before splitting.
 struct RawBlock {
     std::vector<Vec3d> points;
-    CellList cells;                         ///< 3D cells that take part; node indices and face streams are checked
-    std::vector<std::int64_t> sourceCell;   ///< position of each of these cells in the block; empty when it is the same
-    std::int64_t sourceCells = 0;           ///< cells of the block of any kind
-    std::vector<Field> fields;              ///< point: a tuple for every point; cell: one for every source cell
-    std::vector<ArrayInfo> arrays;          ///< all arrays there are, asked for or not
+    CellList cells;  ///< 3D cells that take part; node indices and face streams are checked
+    std::vector<std::int64_t>
+        sourceCell;  ///< position of each of these cells in the block; empty when it is the same
+    std::int64_t sourceCells = 0;   ///< cells of the block of any kind
+    std::vector<Field> fields;      ///< point: a tuple for every point; cell: one for every source cell
+    std::vector<ArrayInfo> arrays;  ///< all arrays there are, asked for or not
 };
 
 /// A file before splitting.
 struct RawMesh {
     std::vector<RawBlock> blocks;
-    ImportStatistics statistics;   ///< what the reader of the format counts: cells, skipped, blanked, higher order, warnings
+    ImportStatistics statistics;  ///< what the reader of the format counts: cells, skipped, blanked, higher
+                                  ///< order, warnings
 };
 
 /// The name under which a cell field is known when a point field has the same one.
@@ -39,8 +41,9 @@ std::string cellFieldName(const std::string& name);
 /// Whether the options ask for an array of this name and place.
 bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location);
 
-/// Merges the blocks, drops nodes that no cell uses, splits the cells, carries the fields over and fills the statistics.
-/// Throws InputError.
-MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options, const Execution& execution);
+/// Merges the blocks, drops nodes that no cell uses, splits the cells, carries the fields over and fills the
+/// statistics. Throws InputError.
+MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options,
+                      const Execution& execution);
 
 }  // namespace tessera

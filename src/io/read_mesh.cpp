@@ -16,7 +16,8 @@ namespace tessera {
 namespace {
 
 constexpr const char* kFormats =
-    ".vtu .pvtu .vts .pvts .vtr .pvtr .vti .pvti .vtm .vtk (VTK), .ex2 .e .exo .exii .g (Exodus), .cgns, .case .encas (EnSight), "
+    ".vtu .pvtu .vts .pvts .vtr .pvtr .vti .pvti .vtm .vtk (VTK), .ex2 .e .exo .exii .g (Exodus), .cgns, "
+    ".case .encas (EnSight), "
     ".foam (OpenFOAM), .node .ele (TetGen)";
 
 std::string extensionOf(const std::string& path) {
@@ -41,27 +42,32 @@ bool looksLikeNetcdfOrHdf5(std::string_view bytes) {
 }
 
 bool looksLikeCgns(std::string_view bytes) {
-    return bytes.starts_with("\x89HDF\r\n\x1a\n") || bytes.substr(0, 64).find("ADF Database") != std::string_view::npos;
+    return bytes.starts_with("\x89HDF\r\n\x1a\n") ||
+           bytes.substr(0, 64).find("ADF Database") != std::string_view::npos;
 }
 
 /// Chooses by content where that tells, else by the name.
 RawMesh readRaw(const std::string& path, const ReadOptions& options, const Execution& execution) {
     const std::string extension = extensionOf(path);
-    if (extension == ".foam" && std::filesystem::exists(path))   // a marker beside the case, mostly empty
+    if (extension == ".foam" && std::filesystem::exists(path))  // a marker beside the case, mostly empty
         return readVtk(path, VtkFormat::openfoam, options, execution);
     const MappedFile file(path);
     const std::string_view head = file.bytes().substr(0, 4096);
     if (isOneOf(extension, {".node", ".ele"})) return readTetgen(path, options);
     if (head.starts_with("# vtk DataFile")) return readVtk(path, VtkFormat::legacy, options, execution);
-    if (isOneOf(extension, {".vtu", ".pvtu", ".vts", ".pvts", ".vtr", ".pvtr", ".vti", ".pvti", ".vtm", ".vtmb"}))
+    if (isOneOf(extension,
+                {".vtu", ".pvtu", ".vts", ".pvts", ".vtr", ".pvtr", ".vti", ".pvti", ".vtm", ".vtmb"}))
         return readVtk(path, VtkFormat::xml, options, execution);
-    if (extension == ".vtk") return readVtk(path, looksLikeXml(head) ? VtkFormat::xml : VtkFormat::legacy, options, execution);
+    if (extension == ".vtk")
+        return readVtk(path, looksLikeXml(head) ? VtkFormat::xml : VtkFormat::legacy, options, execution);
     if (isOneOf(extension, {".ex2", ".e", ".exo", ".exii", ".g"})) {
-        if (!looksLikeNetcdfOrHdf5(head)) throw InputError(path + ": isn't an Exodus file: expected a NetCDF or HDF5 head");
+        if (!looksLikeNetcdfOrHdf5(head))
+            throw InputError(path + ": isn't an Exodus file: expected a NetCDF or HDF5 head");
         return readVtk(path, VtkFormat::exodus, options, execution);
     }
     if (extension == ".cgns") {
-        if (!looksLikeCgns(head)) throw InputError(path + ": isn't a CGNS file: expected an HDF5 or ADF head");
+        if (!looksLikeCgns(head))
+            throw InputError(path + ": isn't a CGNS file: expected an HDF5 or ADF head");
         return readVtk(path, VtkFormat::cgns, options, execution);
     }
     if (isOneOf(extension, {".case", ".encas"})) {

@@ -28,7 +28,8 @@ class NumberLines {
             skipSpaces();
             if (!line_.empty()) return;
         }
-        throw InputError(path_ + ": ends after line " + std::to_string(lineNumber_) + ", expected " + expected);
+        throw InputError(path_ + ": ends after line " + std::to_string(lineNumber_) + ", expected " +
+                         expected);
     }
 
     bool atEnd() {
@@ -73,8 +74,8 @@ std::int64_t readCount(NumberLines& lines, const char* what) {
     const auto count = lines.read<std::int64_t>(what);
     // Every item takes a line of 2 bytes at least.
     if (count < 0 || count > std::int64_t(lines.bytes()))
-        lines.fail("declares " + std::to_string(count) + " as " + what + ", the file has " + std::to_string(lines.bytes()) +
-                   " bytes");
+        lines.fail("declares " + std::to_string(count) + " as " + what + ", the file has " +
+                   std::to_string(lines.bytes()) + " bytes");
     return count;
 }
 
@@ -87,7 +88,8 @@ std::int64_t readNodes(const std::string& path, RawBlock& block) {
     const auto dimension = lines.atEnd() ? 3 : lines.read<std::int64_t>("dimension");
     if (dimension != 3) lines.fail("dimension is " + std::to_string(dimension) + ", expected 3");
     const auto attributes = lines.atEnd() ? 0 : lines.read<std::int64_t>("number of attributes");
-    if (attributes < 0 || attributes > 1000) lines.fail("number of attributes is " + std::to_string(attributes));
+    if (attributes < 0 || attributes > 1000)
+        lines.fail("number of attributes is " + std::to_string(attributes));
     const auto base = block.fields.size();
     for (std::int64_t a = 0; a < attributes; ++a) {
         const std::string name = "attribute_" + std::to_string(a + 1);
@@ -99,7 +101,8 @@ std::int64_t readNodes(const std::string& path, RawBlock& block) {
         lines.next("a node");
         const auto index = lines.read<std::int64_t>("node index");
         if (n == 0) {
-            if (index != 0 && index != 1) lines.fail("the first node has index " + std::to_string(index) + ", expected 0 or 1");
+            if (index != 0 && index != 1)
+                lines.fail("the first node has index " + std::to_string(index) + ", expected 0 or 1");
             first = index;
         }
         if (index != n + first)
@@ -112,12 +115,14 @@ std::int64_t readNodes(const std::string& path, RawBlock& block) {
     return first;
 }
 
-void readElements(const std::string& path, std::int64_t firstNode, RawBlock& block, ImportStatistics& statistics) {
+void readElements(const std::string& path, std::int64_t firstNode, RawBlock& block,
+                  ImportStatistics& statistics) {
     NumberLines lines(path);
     lines.next("the number of elements");
     const std::int64_t count = readCount(lines, "number of elements");
     const auto corners = lines.atEnd() ? 4 : lines.read<std::int64_t>("nodes per element");
-    if (corners != 4 && corners != 10) lines.fail("nodes per element is " + std::to_string(corners) + ", expected 4 or 10");
+    if (corners != 4 && corners != 10)
+        lines.fail("nodes per element is " + std::to_string(corners) + ", expected 4 or 10");
     const bool regions = !lines.atEnd() && lines.read<std::int64_t>("number of attributes") > 0;
     Field region{"region", FieldLocation::cell, 1, {}};
     const auto nodeCount = std::int64_t(block.points.size());
@@ -125,13 +130,14 @@ void readElements(const std::string& path, std::int64_t firstNode, RawBlock& blo
         lines.next("an element");
         const auto index = lines.read<std::int64_t>("element index");
         if (index != e + firstNode)
-            lines.fail("element index is " + std::to_string(index) + ", expected " + std::to_string(e + firstNode));
+            lines.fail("element index is " + std::to_string(index) + ", expected " +
+                       std::to_string(e + firstNode));
         std::int32_t nodes[4] = {};
         for (std::int64_t i = 0; i < corners; ++i) {
             const auto node = lines.read<std::int64_t>("node index");
             if (node < firstNode || node - firstNode >= nodeCount)
-                lines.fail("node index " + std::to_string(node) + " is out of range " + std::to_string(firstNode) + " to " +
-                           std::to_string(firstNode + nodeCount - 1));
+                lines.fail("node index " + std::to_string(node) + " is out of range " +
+                           std::to_string(firstNode) + " to " + std::to_string(firstNode + nodeCount - 1));
             if (i < 4) nodes[i] = std::int32_t(node - firstNode);
         }
         block.cells.add(CellKind::tet, nodes, 4);
@@ -155,7 +161,8 @@ RawMesh readTetgen(const std::string& path, const ReadOptions& options) {
     RawBlock block;
     const std::int64_t firstNode = readNodes(nodePath, block);
     readElements(elementPath, firstNode, block, raw.statistics);
-    std::erase_if(block.fields, [&](const Field& field) { return !isWanted(options, field.name, field.location); });
+    std::erase_if(block.fields,
+                  [&](const Field& field) { return !isWanted(options, field.name, field.location); });
     raw.blocks.push_back(std::move(block));
     return raw;
 }

@@ -35,8 +35,8 @@ namespace tessera {
 namespace {
 
 struct XmlReaderKind {
-    const char* type;          // attribute of <VTKFile>
-    const char* description;   // for the user
+    const char* type;         // attribute of <VTKFile>
+    const char* description;  // for the user
     vtkSmartPointer<vtkXMLReader> (*make)();
 };
 
@@ -82,8 +82,9 @@ OpenReader openXml(const std::string& path, const XmlFileInfo& info) {
         reader->SetFileName(path.c_str());
         return {reader, kind.description};
     }
-    throw InputError(path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
-                     (info.type == "Collection" ? "; name one of its files, or resample the .pvd as a series" : ""));
+    throw InputError(
+        path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
+        (info.type == "Collection" ? "; name one of its files, or resample the .pvd as a series" : ""));
 }
 
 OpenReader openExodus(const std::string& path) {
@@ -149,12 +150,18 @@ OpenReader openLegacy(const std::string& path) {
 
 OpenReader open(const std::string& path, VtkFormat format, const XmlFileInfo& info) {
     switch (format) {
-        case VtkFormat::xml: return openXml(path, info);
-        case VtkFormat::legacy: return openLegacy(path);
-        case VtkFormat::exodus: return openExodus(path);
-        case VtkFormat::cgns: return openCgns(path);
-        case VtkFormat::ensight: return openEnSight(path);
-        case VtkFormat::openfoam: break;
+        case VtkFormat::xml:
+            return openXml(path, info);
+        case VtkFormat::legacy:
+            return openLegacy(path);
+        case VtkFormat::exodus:
+            return openExodus(path);
+        case VtkFormat::cgns:
+            return openCgns(path);
+        case VtkFormat::ensight:
+            return openEnSight(path);
+        case VtkFormat::openfoam:
+            break;
     }
     return openFoam(path);
 }
@@ -190,12 +197,13 @@ void checkCounts(const std::string& path, const XmlFileInfo& info, vtkDataObject
     const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
     const auto cells = std::int64_t(data->GetNumberOfElements(vtkDataObject::CELL));
     if (points != info.points || cells != info.cells)
-        throw InputError(path + ": damaged or cut off: it declares " + std::to_string(info.points) + " points and " +
-                         std::to_string(info.cells) + " cells, " + std::to_string(points) + " and " +
-                         std::to_string(cells) + " could be read");
+        throw InputError(path + ": damaged or cut off: it declares " + std::to_string(info.points) +
+                         " points and " + std::to_string(info.cells) + " cells, " + std::to_string(points) +
+                         " and " + std::to_string(cells) + " could be read");
 }
 
-RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options, const Execution& execution) {
+RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options,
+             const Execution& execution) {
     RawMesh raw;
     XmlFileInfo info;
     if (format == VtkFormat::xml) info = checkXmlFile(path);
@@ -219,7 +227,8 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     raw.statistics.format = opened.format;
     appendVtkData(path, data, options, execution, raw);
     throwOnErrors(path, messages);
-    for (const std::string& warning : messages.warnings()) raw.statistics.warnings.push_back("VTK: " + warning);
+    for (const std::string& warning : messages.warnings())
+        raw.statistics.warnings.push_back("VTK: " + warning);
     if (!raw.blocks.empty())
         raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
     return raw;
@@ -227,7 +236,8 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
 
 }  // namespace
 
-RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options, const Execution& execution) {
+RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
+                const Execution& execution) {
     try {
         return read(path, format, options, execution);
     } catch (const std::bad_alloc&) {

@@ -41,36 +41,49 @@ struct CellRule {
 
 CellRule ruleOf(int type) {
     switch (type) {
-        case VTK_TETRA: return {true, CellKind::tet, 4, false};
-        case VTK_VOXEL: return {true, CellKind::voxel, 8, false};
-        case VTK_HEXAHEDRON: return {true, CellKind::hex, 8, false};
-        case VTK_WEDGE: return {true, CellKind::wedge, 6, false};
-        case VTK_PYRAMID: return {true, CellKind::pyramid, 5, false};
-        case VTK_PENTAGONAL_PRISM: return {true, CellKind::polyhedron, 10, false};
-        case VTK_HEXAGONAL_PRISM: return {true, CellKind::polyhedron, 12, false};
-        case VTK_POLYHEDRON: return {true, CellKind::polyhedron, 0, false};
+        case VTK_TETRA:
+            return {true, CellKind::tet, 4, false};
+        case VTK_VOXEL:
+            return {true, CellKind::voxel, 8, false};
+        case VTK_HEXAHEDRON:
+            return {true, CellKind::hex, 8, false};
+        case VTK_WEDGE:
+            return {true, CellKind::wedge, 6, false};
+        case VTK_PYRAMID:
+            return {true, CellKind::pyramid, 5, false};
+        case VTK_PENTAGONAL_PRISM:
+            return {true, CellKind::polyhedron, 10, false};
+        case VTK_HEXAGONAL_PRISM:
+            return {true, CellKind::polyhedron, 12, false};
+        case VTK_POLYHEDRON:
+            return {true, CellKind::polyhedron, 0, false};
         case VTK_QUADRATIC_TETRA:
         case VTK_HIGHER_ORDER_TETRAHEDRON:
         case VTK_LAGRANGE_TETRAHEDRON:
-        case VTK_BEZIER_TETRAHEDRON: return {true, CellKind::tet, 4, true};
+        case VTK_BEZIER_TETRAHEDRON:
+            return {true, CellKind::tet, 4, true};
         case VTK_QUADRATIC_HEXAHEDRON:
         case VTK_TRIQUADRATIC_HEXAHEDRON:
         case VTK_BIQUADRATIC_QUADRATIC_HEXAHEDRON:
         case VTK_HIGHER_ORDER_HEXAHEDRON:
         case VTK_LAGRANGE_HEXAHEDRON:
-        case VTK_BEZIER_HEXAHEDRON: return {true, CellKind::hex, 8, true};
+        case VTK_BEZIER_HEXAHEDRON:
+            return {true, CellKind::hex, 8, true};
         case VTK_QUADRATIC_WEDGE:
         case VTK_QUADRATIC_LINEAR_WEDGE:
         case VTK_BIQUADRATIC_QUADRATIC_WEDGE:
         case VTK_HIGHER_ORDER_WEDGE:
         case VTK_LAGRANGE_WEDGE:
-        case VTK_BEZIER_WEDGE: return {true, CellKind::wedge, 6, true};
+        case VTK_BEZIER_WEDGE:
+            return {true, CellKind::wedge, 6, true};
         case VTK_QUADRATIC_PYRAMID:
         case VTK_TRIQUADRATIC_PYRAMID:
         case VTK_HIGHER_ORDER_PYRAMID:
         case VTK_LAGRANGE_PYRAMID:
-        case VTK_BEZIER_PYRAMID: return {true, CellKind::pyramid, 5, true};
-        default: return {};
+        case VTK_BEZIER_PYRAMID:
+            return {true, CellKind::pyramid, 5, true};
+        default:
+            return {};
     }
 }
 
@@ -81,19 +94,24 @@ struct Ghosts {
     unsigned char cellMask = 0;
 
     bool hidesCell(std::int64_t c) const { return cells && (cells[c] & cellMask); }
-    bool hidesPoint(std::int64_t p) const { return points && (points[p] & vtkDataSetAttributes::HIDDENPOINT); }
+    bool hidesPoint(std::int64_t p) const {
+        return points && (points[p] & vtkDataSetAttributes::HIDDENPOINT);
+    }
 };
 
 const unsigned char* tags(vtkDataSetAttributes* attributes, const char* name, vtkIdType count) {
     auto* array = vtkUnsignedCharArray::SafeDownCast(attributes->GetAbstractArray(name));
-    return array && array->GetNumberOfComponents() == 1 && array->GetNumberOfTuples() == count ? array->GetPointer(0)
-                                                                                                : nullptr;
+    return array && array->GetNumberOfComponents() == 1 && array->GetNumberOfTuples() == count
+               ? array->GetPointer(0)
+               : nullptr;
 }
 
 Ghosts ghostsOf(vtkDataSet* data) {
     Ghosts ghosts;
-    ghosts.points = tags(data->GetPointData(), vtkDataSetAttributes::GhostArrayName(), data->GetNumberOfPoints());
-    ghosts.cells = tags(data->GetCellData(), vtkDataSetAttributes::GhostArrayName(), data->GetNumberOfCells());
+    ghosts.points =
+        tags(data->GetPointData(), vtkDataSetAttributes::GhostArrayName(), data->GetNumberOfPoints());
+    ghosts.cells =
+        tags(data->GetCellData(), vtkDataSetAttributes::GhostArrayName(), data->GetNumberOfCells());
     ghosts.cellMask = vtkDataSetAttributes::DUPLICATECELL | vtkDataSetAttributes::HIDDENCELL |
                       vtkDataSetAttributes::REFINEDCELL;
     if (!ghosts.cells) {
@@ -104,7 +122,8 @@ Ghosts ghostsOf(vtkDataSet* data) {
     return ghosts;
 }
 
-void copyPoints(const std::string& path, vtkDataSet* data, const Execution& execution, std::vector<Vec3d>& points) {
+void copyPoints(const std::string& path, vtkDataSet* data, const Execution& execution,
+                std::vector<Vec3d>& points) {
     const vtkIdType count = data->GetNumberOfPoints();
     if (count > std::numeric_limits<std::int32_t>::max())
         throw InputError(path + ": has " + std::to_string(count) + " nodes; at most 2147483647 are possible");
@@ -116,7 +135,8 @@ void copyPoints(const std::string& path, vtkDataSet* data, const Execution& exec
     const auto copyFrom = [&](const auto* values) {
         parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t i = begin; i < end; ++i)
-                points[std::size_t(i)] = {double(values[3 * i]), double(values[3 * i + 1]), double(values[3 * i + 2])};
+                points[std::size_t(i)] = {double(values[3 * i]), double(values[3 * i + 1]),
+                                          double(values[3 * i + 2])};
         });
     };
     if (array && array->HasStandardMemoryLayout() && array->GetDataType() == VTK_DOUBLE)
@@ -137,9 +157,12 @@ void copyValues(vtkDataArray* array, const Execution& execution, std::vector<dou
         });
     };
     if (array->HasStandardMemoryLayout()) {
-        switch (array->GetDataType()) { vtkTemplateMacro(copyFrom(static_cast<const VTK_TT*>(array->GetVoidPointer(0))); return); }
+        switch (array->GetDataType()) {
+            vtkTemplateMacro(copyFrom(static_cast<const VTK_TT*>(array->GetVoidPointer(0))); return );
+        }
     }
-    for (vtkIdType i = 0; i < count; ++i) values[std::size_t(i)] = array->GetComponent(i / components, int(i % components));
+    for (vtkIdType i = 0; i < count; ++i)
+        values[std::size_t(i)] = array->GetComponent(i / components, int(i % components));
 }
 
 /// Bookkeeping of readers and filters, not data.
@@ -147,21 +170,24 @@ bool isInternalName(const std::string& name) {
     return name.size() > 3 && name.starts_with("vtk") && name[3] >= 'A' && name[3] <= 'Z';
 }
 
-void copyFields(const std::string& path, vtkDataSetAttributes* attributes, FieldLocation location, vtkIdType items,
-                const ReadOptions& options, const Execution& execution, RawBlock& block) {
+void copyFields(const std::string& path, vtkDataSetAttributes* attributes, FieldLocation location,
+                vtkIdType items, const ReadOptions& options, const Execution& execution, RawBlock& block) {
     std::set<std::string> seen;
     for (int a = 0; a < attributes->GetNumberOfArrays(); ++a) {
         vtkAbstractArray* abstract = attributes->GetAbstractArray(a);
         if (!abstract) continue;
         std::string name = abstract->GetName() ? abstract->GetName() : "";
         if (isInternalName(name)) continue;
-        if (name.empty()) name = (location == FieldLocation::point ? "point_field_" : "cell_field_") + std::to_string(a + 1);
+        if (name.empty())
+            name =
+                (location == FieldLocation::point ? "point_field_" : "cell_field_") + std::to_string(a + 1);
         if (!seen.insert(name).second) continue;
         auto* array = vtkDataArray::SafeDownCast(abstract);
         block.arrays.push_back({name, location, abstract->GetNumberOfComponents(), array != nullptr});
         if (abstract->GetNumberOfTuples() != items)
-            throw InputError(path + ": field '" + name + "' has " + std::to_string(abstract->GetNumberOfTuples()) +
-                             " values for " + std::to_string(items) +
+            throw InputError(path + ": field '" + name + "' has " +
+                             std::to_string(abstract->GetNumberOfTuples()) + " values for " +
+                             std::to_string(items) +
                              (location == FieldLocation::point ? " points" : " cells"));
         if (!array || !isWanted(options, name, location)) continue;
         if (array->GetNumberOfComponents() < 1 || array->GetNumberOfComponents() > 9) continue;
@@ -173,7 +199,7 @@ void copyFields(const std::string& path, vtkDataSetAttributes* attributes, Field
 
 struct ChunkCounts {
     std::int64_t cells = 0, nodes = 0, skipped = 0, blanked = 0, higherOrder = 0;
-    std::int64_t bad = -1;   // first cell that is damaged
+    std::int64_t bad = -1;  // first cell that is damaged
 };
 
 /// Reads cells of a vtkUnstructuredGrid with offsets and connectivity of type Id.
@@ -181,7 +207,10 @@ template <class Id>
 class UnstructuredCells {
   public:
     UnstructuredCells(const std::string& path, vtkUnstructuredGrid* grid, const Ghosts& ghosts)
-        : path_(path), ghosts_(ghosts), cellCount_(grid->GetNumberOfCells()), pointCount_(grid->GetNumberOfPoints()) {
+        : path_(path),
+          ghosts_(ghosts),
+          cellCount_(grid->GetNumberOfCells()),
+          pointCount_(grid->GetNumberOfPoints()) {
         vtkCellArray* cells = grid->GetCells();
         offsets_ = static_cast<const Id*>(cells->GetOffsetsArray()->GetVoidPointer(0));
         nodes_ = static_cast<const Id*>(cells->GetConnectivityArray()->GetVoidPointer(0));
@@ -231,16 +260,17 @@ class UnstructuredCells {
         const std::string name = "cell " + std::to_string(c) + " (counted from 0)";
         const auto begin = std::int64_t(offsets_[c]), end = std::int64_t(offsets_[c + 1]);
         if (begin < 0 || begin > end || end > nodeCount_)
-            return name + " has nodes " + std::to_string(begin) + " to " + std::to_string(end) + " of a list of " +
-                   std::to_string(nodeCount_);
+            return name + " has nodes " + std::to_string(begin) + " to " + std::to_string(end) +
+                   " of a list of " + std::to_string(nodeCount_);
         if (!rule.solid) return {};
         if (end - begin < rule.corners)
-            return name + " has " + std::to_string(end - begin) + " nodes, its type needs " + std::to_string(rule.corners);
+            return name + " has " + std::to_string(end - begin) + " nodes, its type needs " +
+                   std::to_string(rule.corners);
         std::string wrong;
         const auto checkNode = [&](std::int64_t node) {
             if (wrong.empty() && (node < 0 || node >= pointCount_))
-                wrong = name + " has node index " + std::to_string(node) + ", there are " + std::to_string(pointCount_) +
-                        " points";
+                wrong = name + " has node index " + std::to_string(node) + ", there are " +
+                        std::to_string(pointCount_) + " points";
         };
         for (int i = 0; i < rule.corners; ++i) checkNode(std::int64_t(nodes_[begin + i]));
         if (types_[c] != VTK_POLYHEDRON || !wrong.empty()) return wrong;
@@ -360,8 +390,8 @@ class UnstructuredCells {
     const vtkIdType* facePlaces_ = nullptr;
 };
 
-void readUnstructured(const std::string& path, vtkUnstructuredGrid* grid, const Execution& execution, RawBlock& block,
-                      ImportStatistics& statistics) {
+void readUnstructured(const std::string& path, vtkUnstructuredGrid* grid, const Execution& execution,
+                      RawBlock& block, ImportStatistics& statistics) {
     if (grid->GetNumberOfCells() == 0) return;
     const Ghosts ghosts = ghostsOf(grid);
     if (grid->GetCells()->IsStorage64Bit())
@@ -372,7 +402,8 @@ void readUnstructured(const std::string& path, vtkUnstructuredGrid* grid, const 
 
 /// Hexahedra of a grid with i running fastest.
 template <class IsVisible>
-void readStructured(const int dimensions[3], const IsVisible& isVisible, RawBlock& block, ImportStatistics& statistics) {
+void readStructured(const int dimensions[3], const IsVisible& isVisible, RawBlock& block,
+                    ImportStatistics& statistics) {
     const std::int64_t nx = dimensions[0], ny = dimensions[1], nz = dimensions[2];
     if (nx < 2 || ny < 2 || nz < 2) {
         statistics.skippedCells += block.sourceCells;
@@ -388,8 +419,9 @@ void readStructured(const int dimensions[3], const IsVisible& isVisible, RawBloc
                 }
                 const auto first = std::int32_t((k * ny + j) * nx + i);
                 const auto row = std::int32_t(nx), layer = std::int32_t(nx * ny);
-                const std::int32_t nodes[8] = {first,         first + 1,         first + row + 1,         first + row,
-                                               first + layer, first + layer + 1, first + layer + row + 1, first + layer + row};
+                const std::int32_t nodes[8] = {
+                    first,         first + 1,         first + row + 1,         first + row,
+                    first + layer, first + layer + 1, first + layer + row + 1, first + layer + row};
                 block.cells.add(CellKind::hex, nodes, 8);
                 block.sourceCell.push_back(cell);
             }
@@ -403,19 +435,19 @@ void readStructured(const std::string& path, Grid* grid, RawBlock& block, Import
     grid->GetDimensions(dimensions);
     const std::int64_t points = std::int64_t(dimensions[0]) * dimensions[1] * dimensions[2];
     if (points != grid->GetNumberOfPoints() || points > std::numeric_limits<std::int32_t>::max())
-        throw InputError(path + ": a grid of " + std::to_string(dimensions[0]) + " x " + std::to_string(dimensions[1]) +
-                         " x " + std::to_string(dimensions[2]) + " points has " +
-                         std::to_string(grid->GetNumberOfPoints()) + " points");
+        throw InputError(path + ": a grid of " + std::to_string(dimensions[0]) + " x " +
+                         std::to_string(dimensions[1]) + " x " + std::to_string(dimensions[2]) +
+                         " points has " + std::to_string(grid->GetNumberOfPoints()) + " points");
     const Ghosts ghosts = ghostsOf(grid);
     const bool blanked = grid->HasAnyBlankCells() || grid->HasAnyBlankPoints();
     readStructured(
         dimensions,
-        [&](std::int64_t cell) { return !ghosts.hidesCell(cell) && (!blanked || grid->IsCellVisible(cell)); }, block,
-        statistics);
+        [&](std::int64_t cell) { return !ghosts.hidesCell(cell) && (!blanked || grid->IsCellVisible(cell)); },
+        block, statistics);
 }
 
-void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions& options, const Execution& execution,
-                   RawMesh& raw) {
+void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions& options,
+                   const Execution& execution, RawMesh& raw) {
     RawBlock block;
     block.sourceCells = data->GetNumberOfCells();
     if (auto* unstructured = vtkUnstructuredGrid::SafeDownCast(data))
@@ -430,15 +462,17 @@ void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions&
         raw.statistics.skippedCells += data->GetNumberOfCells();
     if (block.cells.kinds.empty()) return;
     copyPoints(path, data, execution, block.points);
-    copyFields(path, data->GetPointData(), FieldLocation::point, data->GetNumberOfPoints(), options, execution, block);
-    copyFields(path, data->GetCellData(), FieldLocation::cell, data->GetNumberOfCells(), options, execution, block);
+    copyFields(path, data->GetPointData(), FieldLocation::point, data->GetNumberOfPoints(), options,
+               execution, block);
+    copyFields(path, data->GetCellData(), FieldLocation::cell, data->GetNumberOfCells(), options, execution,
+               block);
     raw.blocks.push_back(std::move(block));
 }
 
 }  // namespace
 
-void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptions& options, const Execution& execution,
-                   RawMesh& raw) {
+void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptions& options,
+                   const Execution& execution, RawMesh& raw) {
     if (auto* set = vtkDataSet::SafeDownCast(data)) {
         appendDataSet(path, set, options, execution, raw);
         return;

@@ -6,8 +6,9 @@ class vtkDataObject;
 
 namespace tessera {
 
-/// Appends what VTK read, a data set or any composite of them, to `raw`, checking every index before it is used. Throws InputError.
-void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptions& options, const Execution& execution,
-                   RawMesh& raw);
+/// Appends what VTK read, a data set or any composite of them, to `raw`, checking every index before it is
+/// used. Throws InputError.
+void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptions& options,
+                   const Execution& execution, RawMesh& raw);
 
 }  // namespace tessera

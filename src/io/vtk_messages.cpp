@@ -44,7 +44,7 @@ class CollectingWindow : public vtkOutputWindow {
 
   private:
     void add(std::vector<std::string>& list, const char* text) {
-        std::lock_guard lock(mutex_);   // VTK's own worker threads may report too
+        std::lock_guard lock(mutex_);  // VTK's own worker threads may report too
         if (list.size() < 100) list.push_back(messageText(text));
     }
     mutable std::mutex mutex_;
@@ -72,7 +72,11 @@ VtkMessages::~VtkMessages() {
     vtkOutputWindow::SetInstance(impl_->before);
 }
 
-std::vector<std::string> VtkMessages::errors() const { return impl_->window->copy(impl_->window->errors); }
-std::vector<std::string> VtkMessages::warnings() const { return impl_->window->copy(impl_->window->warnings); }
+std::vector<std::string> VtkMessages::errors() const {
+    return impl_->window->copy(impl_->window->errors);
+}
+std::vector<std::string> VtkMessages::warnings() const {
+    return impl_->window->copy(impl_->window->warnings);
+}
 
 }  // namespace tessera

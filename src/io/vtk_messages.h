@@ -7,8 +7,9 @@
 
 namespace tessera {
 
-/// While it lives, keeps VTK's messages from the terminal and collects its errors, from readers, their parsers and inner readers
-/// alike. VTK has one output window for the process, so only one capture lives at a time; others wait.
+/// While it lives, keeps VTK's messages from the terminal and collects its errors, from readers, their
+/// parsers and inner readers alike. VTK has one output window for the process, so only one capture lives at a
+/// time; others wait.
 class VtkMessages {
   public:
     VtkMessages();

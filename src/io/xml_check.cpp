@@ -29,10 +29,14 @@ std::size_t skipProlog(std::string_view text, std::size_t at) {
         at = text.find_first_not_of(kSpaces, at);
         if (at == std::string_view::npos) return text.size();
         std::string_view end;
-        if (text.substr(at).starts_with("<?")) end = "?>";
-        else if (text.substr(at).starts_with("<!--")) end = "-->";
-        else if (text.substr(at).starts_with("<!")) end = ">";
-        else return at;
+        if (text.substr(at).starts_with("<?"))
+            end = "?>";
+        else if (text.substr(at).starts_with("<!--"))
+            end = "-->";
+        else if (text.substr(at).starts_with("<!"))
+            end = ">";
+        else
+            return at;
         const std::size_t close = text.find(end, at);
         if (close == std::string_view::npos) return text.size();
         at = close + end.size();
@@ -54,7 +58,8 @@ std::optional<std::string_view> attribute(std::string_view tag, std::string_view
     return std::nullopt;
 }
 
-std::int64_t countAttribute(const std::string& path, std::string_view tag, std::string_view name, std::size_t byte) {
+std::int64_t countAttribute(const std::string& path, std::string_view tag, std::string_view name,
+                            std::size_t byte) {
     const auto text = attribute(tag, name);
     if (!text) return 0;
     const std::size_t begin = std::min(text->find_first_not_of(kSpaces), text->size());
@@ -62,8 +67,8 @@ std::int64_t countAttribute(const std::string& path, std::string_view tag, std::
     const auto result = std::from_chars(text->data() + begin, text->data() + text->size(), value);
     const bool onlyDigits = text->find_first_not_of("0123456789 \t\r\n") == std::string_view::npos;
     if (result.ec != std::errc() || !onlyDigits || value > (std::int64_t(1) << 40))
-        throw InputError(path + ": byte " + std::to_string(byte) + ": " + std::string(name) + " is " + quoted(*text) +
-                         ", expected a count");
+        throw InputError(path + ": byte " + std::to_string(byte) + ": " + std::string(name) + " is " +
+                         quoted(*text) + ", expected a count");
     return value;
 }
 
@@ -71,20 +76,22 @@ std::int64_t countAttribute(const std::string& path, std::string_view tag, std::
 std::optional<double> unpackedBound(std::string_view root, std::size_t fileBytes) {
     const std::string_view compressor = attribute(root, "compressor").value_or("");
     if (compressor.empty()) return double(fileBytes);
-    if (compressor == "vtkZLibDataCompressor") return double(fileBytes) * 1040;   // deflate's best ratio is 1032
+    if (compressor == "vtkZLibDataCompressor")
+        return double(fileBytes) * 1040;  // deflate's best ratio is 1032
     if (compressor == "vtkLZ4DataCompressor") return double(fileBytes) * 256;
     return std::nullopt;
 }
 
 /// Checks the files that a parallel or multi-block file names.
-void checkPieces(const std::string& path, std::string_view text, std::string_view tagName, std::string_view attributeName,
-                 int depth) {
+void checkPieces(const std::string& path, std::string_view text, std::string_view tagName,
+                 std::string_view attributeName, int depth) {
     for (std::size_t at = text.find(tagName); at != std::string_view::npos; at = text.find(tagName, at + 1)) {
         const auto name = attribute(text.substr(at, text.find('>', at) - at), attributeName);
         if (!name || name->empty()) continue;
         const auto piece = std::filesystem::path(path).parent_path() / std::string(*name);
         if (!std::filesystem::exists(piece))
-            throw InputError(path + ": byte " + std::to_string(at) + ": names " + piece.string() + ", which doesn't exist");
+            throw InputError(path + ": byte " + std::to_string(at) + ": names " + piece.string() +
+                             ", which doesn't exist");
         checkXmlFile(piece.string(), depth + 1);
     }
 }
@@ -107,16 +114,18 @@ XmlFileInfo checkXmlFile(const std::string& path, int depth) {
     const std::string_view endTag = "</VTKFile>";
     const std::size_t end = text.rfind(endTag);
     if (end == std::string_view::npos || end < rootEnd)
-        throw InputError(path + ": cut off: byte " + std::to_string(text.size()) + " is its last, and there is no </VTKFile>");
+        throw InputError(path + ": cut off: byte " + std::to_string(text.size()) +
+                         " is its last, and there is no </VTKFile>");
     const std::size_t after = skipProlog(text, end + endTag.size());
     if (after < text.size())
-        throw InputError(path + ": damaged: byte " + std::to_string(after) + " has " + quoted(text.substr(after)) +
-                         " after </VTKFile>");
+        throw InputError(path + ": damaged: byte " + std::to_string(after) + " has " +
+                         quoted(text.substr(after)) + " after </VTKFile>");
 
     XmlFileInfo info;
     info.type = std::string(*type);
     const std::string_view markup = text.substr(0, text.find("<AppendedData", rootEnd));
-    for (std::size_t at = markup.find("<Piece", rootEnd); at != std::string_view::npos; at = markup.find("<Piece", at + 1)) {
+    for (std::size_t at = markup.find("<Piece", rootEnd); at != std::string_view::npos;
+         at = markup.find("<Piece", at + 1)) {
         const std::string_view tag = markup.substr(at, markup.find('>', at) - at);
         info.points += countAttribute(path, tag, "NumberOfPoints", at);
         info.cells += countAttribute(path, tag, "NumberOfCells", at);
@@ -135,18 +144,24 @@ XmlFileInfo checkXmlFile(const std::string& path, int depth) {
 
 }  // namespace
 
-XmlFileInfo checkXmlFile(const std::string& path) { return checkXmlFile(path, 0); }
+XmlFileInfo checkXmlFile(const std::string& path) {
+    return checkXmlFile(path, 0);
+}
 
 void checkLegacyFile(const std::string& path) {
     const MappedFile file(path);
     const std::string_view text = file.bytes();
     if (!text.starts_with("# vtk DataFile Version"))
-        throw InputError(path + ": isn't a VTK file: it begins with " + quoted(text) + ", expected '# vtk DataFile Version'");
+        throw InputError(path + ": isn't a VTK file: it begins with " + quoted(text) +
+                         ", expected '# vtk DataFile Version'");
     std::size_t at = 0;
-    for (int line = 0; line < 4 && at != std::string_view::npos; ++line) at = text.find('\n', at == 0 ? 0 : at + 1);
+    for (int line = 0; line < 4 && at != std::string_view::npos; ++line)
+        at = text.find('\n', at == 0 ? 0 : at + 1);
     if (at == std::string_view::npos && text.find("DATASET") == std::string_view::npos)
-        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) + ", inside the four lines of its head");
-    for (const std::string_view keyword : {"\nPOINTS ", "\nCELLS ", "\nCELL_TYPES ", "\nPOINT_DATA ", "\nCELL_DATA "}) {
+        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) +
+                         ", inside the four lines of its head");
+    for (const std::string_view keyword :
+         {"\nPOINTS ", "\nCELLS ", "\nCELL_TYPES ", "\nPOINT_DATA ", "\nCELL_DATA "}) {
         for (at = text.find(keyword); at != std::string_view::npos; at = text.find(keyword, at + 1)) {
             std::int64_t count = 0;
             const char* begin = text.data() + at + keyword.size();
@@ -155,8 +170,8 @@ void checkLegacyFile(const std::string& path) {
             if (result.ec == std::errc::invalid_argument) continue;
             if (result.ec != std::errc() || count < 0 || count > std::int64_t(text.size()))
                 throw InputError(path + ": damaged: byte " + std::to_string(at + 1) + " declares " +
-                                 quoted(text.substr(at + 1, text.find('\n', at + 1) - at - 1)) + ", more than " +
-                                 std::to_string(text.size()) + " bytes can hold");
+                                 quoted(text.substr(at + 1, text.find('\n', at + 1) - at - 1)) +
+                                 ", more than " + std::to_string(text.size()) + " bytes can hold");
         }
     }
 }

@@ -9,49 +9,60 @@ namespace {
 
 constexpr std::int64_t kChunk = 1 << 14;
 
-struct CodedItem {
-    std::uint64_t code;
-    std::int32_t item;
-    bool operator<(const CodedItem& other) const {
-        return code != other.code ? code < other.code : item < other.item;
-    }
+/// Below this many items one task sorts a whole subtree.
+constexpr std::int64_t kTaskItems = 1 << 14;
+
+/// An item at the middle of its box.
+struct Item {
+    Vec3d centre;
+    std::int32_t index;
 };
 
-/// Spreads the low 21 bits to every third bit.
-std::uint64_t spreadBits(std::uint64_t x) {
-    x = (x | x << 32) & 0x1f00000000ffffull;
-    x = (x | x << 16) & 0x1f0000ff0000ffull;
-    x = (x | x << 8) & 0x100f00f00f00f00full;
-    x = (x | x << 4) & 0x10c30c30c30c30c3ull;
-    return (x | x << 2) & 0x1249249249249249ull;
-}
-
-std::uint64_t mortonCode(const Vec3d& place, const Vec3d& origin, double scale) {
-    std::uint64_t code = 0;
-    for (int k = 0; k < 3; ++k) {
-        const double x = (place[k] - origin[k]) * scale;
-        const auto cell = x > 0 ? std::uint64_t(std::min(x, 2097151.0)) : 0;   // NaN ends in cell 0
-        code |= spreadBits(cell) << k;
-    }
-    return code;
-}
-
-/// Sorts fixed runs, then merges them pairwise: the same result for any number of threads.
-void sortItems(std::vector<CodedItem>& items, const Execution& execution) {
-    const auto count = std::int64_t(items.size());
-    const std::int64_t run = std::max<std::int64_t>(kChunk, (count + 15) / 16);
-    parallelForChunks(execution, count, run, [&](std::int64_t begin, std::int64_t end) {
-        std::sort(items.begin() + begin, items.begin() + end);
-    });
-    std::vector<CodedItem> merged(items.size());
-    for (std::int64_t width = run; width < count; width *= 2) {
-        parallelForChunks(execution, count, 2 * width, [&](std::int64_t begin, std::int64_t end) {
-            const std::int64_t middle = std::min(begin + width, end);
-            std::merge(items.begin() + begin, items.begin() + middle, items.begin() + middle, items.begin() + end,
-                       merged.begin() + begin);
+/// Puts the items that belong before `middle` in front of it: those with the smaller centre along the longest
+/// side of all centres. Ties go by index, so the result is one and the same.
+void partitionAt(std::span<Item> items, std::int64_t middle) {
+    if (middle <= 0 || middle >= std::int64_t(items.size())) return;
+    Box3d centres;
+    for (const Item& item : items) centres.include(item.centre);
+    const Vec3d size = centres.size();
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    std::nth_element(
+        items.begin(), items.begin() + middle, items.end(), [axis](const Item& a, const Item& b) {
+            return a.centre[axis] != b.centre[axis] ? a.centre[axis] < b.centre[axis] : a.index < b.index;
         });
-        items.swap(merged);
-    }
+}
+
+/// Splits a node of `span` places, 4 to the power of its level, into its four children.
+void splitNode(std::span<Item> items, std::int64_t childSpan) {
+    const auto count = std::int64_t(items.size());
+    const std::int64_t half = std::min(2 * childSpan, count);
+    partitionAt(items, half);
+    partitionAt(items.first(std::size_t(half)), childSpan);
+    if (count > half) partitionAt(items.subspan(std::size_t(half)), childSpan);
+}
+
+void sortSubtree(std::span<Item> items, std::int64_t span) {
+    for (std::int64_t child = span / BoxTree::kWidth; child >= 1; child /= BoxTree::kWidth)
+        for (std::int64_t at = 0; at < std::int64_t(items.size()); at += child * BoxTree::kWidth) {
+            const std::int64_t length = std::min(child * BoxTree::kWidth, std::int64_t(items.size()) - at);
+            splitNode(items.subspan(std::size_t(at), std::size_t(length)), child);
+        }
+}
+
+/// Orders the items so that every node of the tree, 4^level places in a row, is a compact group.
+void sortItems(std::vector<Item>& items, const Execution& execution) {
+    const auto count = std::int64_t(items.size());
+    std::int64_t span = 1;
+    while (span < count) span *= BoxTree::kWidth;
+    const std::span<Item> all(items);
+    const auto part = [&](std::int64_t node) {
+        return all.subspan(std::size_t(node * span), std::size_t(std::min(span, count - node * span)));
+    };
+    for (; span > kTaskItems; span /= BoxTree::kWidth)
+        parallelFor(execution, (count + span - 1) / span,
+                    [&](std::int64_t node) { splitNode(part(node), span / BoxTree::kWidth); });
+    parallelFor(execution, (count + span - 1) / span,
+                [&](std::int64_t node) { sortSubtree(part(node), span); });
 }
 
 BoxTree::Node emptyNode() {
@@ -98,21 +109,16 @@ std::vector<BoxTree::Node> buildLevel(std::int64_t count, const Execution& execu
 BoxTree::BoxTree(std::span<const Box3d> boxes, const Execution& execution) {
     if (boxes.empty()) return;
     const auto count = std::int64_t(boxes.size());
-    Box3d bounds;
-    for (const Box3d& box : boxes) bounds.include(box);
-    const Vec3d size = bounds.size();
-    const double extent = std::max({size.x, size.y, size.z});
-    const double scale = extent > 0 ? 2097152.0 / extent : 0;
-    std::vector<CodedItem> items(boxes.size());
+    std::vector<Item> items(boxes.size());
     parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t i = begin; i < end; ++i) {
             const Box3d& box = boxes[std::size_t(i)];
-            items[std::size_t(i)] = {mortonCode(box.min + 0.5 * (box.max - box.min), bounds.min, scale), std::int32_t(i)};
+            items[std::size_t(i)] = {box.min + 0.5 * (box.max - box.min), std::int32_t(i)};
         }
     });
     sortItems(items, execution);
     order_.resize(boxes.size());
-    for (std::size_t i = 0; i < items.size(); ++i) order_[i] = items[i].item;
+    for (std::size_t i = 0; i < items.size(); ++i) order_[i] = items[i].index;
 
     levels_.push_back(buildLevel(count, execution, [&](std::int64_t place) {
         return boxes[std::size_t(order_[std::size_t(place)])];

@@ -10,8 +10,8 @@
 
 namespace tessera {
 
-/// Bounding volume hierarchy over boxes: items along a Morton curve, four children a node, no pointers. Depends on the boxes
-/// only, not on threads.
+/// Bounding volume hierarchy over boxes: four children a node, split at the median along the longest side, no
+/// pointers. Depends on the boxes only, not on threads.
 class BoxTree {
   public:
     static constexpr int kWidth = 4;
@@ -25,11 +25,14 @@ class BoxTree {
     BoxTree(std::span<const Box3d> boxes, const Execution& execution);
 
     bool empty() const { return order_.empty(); }
-    /// order()[place] is the item at `place` of the curve.
+    /// order()[place] is the item at `place` of the tree's order.
     std::span<const std::int32_t> order() const { return order_; }
-    /// Levels of nodes; the last has one node. Child c of node n is node 4 n + c of the level below, or place 4 n + c on level 0.
+    /// Levels of nodes; the last has one node. Child c of node n is node 4 n + c of the level below, or place
+    /// 4 n + c on level 0.
     int levelCount() const { return int(levels_.size()); }
-    const Node& node(int level, std::int64_t index) const { return levels_[std::size_t(level)][std::size_t(index)]; }
+    const Node& node(int level, std::int64_t index) const {
+        return levels_[std::size_t(level)][std::size_t(index)];
+    }
 
     /// Calls visit(place) for every item whose box meets the closed box.
     template <class Visit>
@@ -43,8 +46,8 @@ class BoxTree {
         const Node& n = node(level, index);
         for (int c = 0; c < kWidth; ++c) {
             const auto k = std::size_t(c);
-            if (n.min[0][k] > box.max.x || n.max[0][k] < box.min.x || n.min[1][k] > box.max.y || n.max[1][k] < box.min.y ||
-                n.min[2][k] > box.max.z || n.max[2][k] < box.min.z)
+            if (n.min[0][k] > box.max.x || n.max[0][k] < box.min.x || n.min[1][k] > box.max.y ||
+                n.max[1][k] < box.min.y || n.min[2][k] > box.max.z || n.max[2][k] < box.min.z)
                 continue;
             if (level == 0)
                 visit(index * kWidth + c);

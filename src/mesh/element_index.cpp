@@ -26,9 +26,8 @@ ElementIndex::~ElementIndex() = default;
 
 void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements) const {
     const auto first = std::ptrdiff_t(elements.size());
-    impl_->tree.visitOverlaps(boxWorld, [&](std::int64_t place) {
-        elements.push_back(impl_->tree.order()[std::size_t(place)]);
-    });
+    impl_->tree.visitOverlaps(
+        boxWorld, [&](std::int64_t place) { elements.push_back(impl_->tree.order()[std::size_t(place)]); });
     std::sort(elements.begin() + first, elements.end());
 }
 

@@ -8,8 +8,8 @@
 
 namespace tessera {
 
-/// Bounding volume hierarchy over elements of a mesh: which elements can touch a box or contain a point. Built once per mesh;
-/// thread-safe after construction.
+/// Bounding volume hierarchy over elements of a mesh: which elements can touch a box or contain a point.
+/// Built once per mesh; thread-safe after construction.
 class ElementIndex {
   public:
     explicit ElementIndex(const TetMesh& mesh, int threads = 0);

@@ -11,12 +11,14 @@ namespace tessera {
 
 /// Which faces the elements share, compared by node indices.
 struct FaceMatching {
-    std::vector<BoundaryFace> boundary;   ///< of elements that aren't flat: faces that no other such element has; ascending by element
-    std::vector<BoundaryFace> lone;       ///< of elements that aren't flat: faces that no other element at all has; ascending by element
-    std::int64_t singleFaces = 0;         ///< faces of one element only, flat elements included
-    std::int64_t pairedFaces = 0;         ///< faces of exactly two elements, flat elements included
-    std::int64_t crowdedFaces = 0;        ///< faces of more than two elements, flat elements included
-    std::int64_t duplicateElements = 0;   ///< elements with the same four nodes as an earlier one
+    std::vector<BoundaryFace> boundary;  ///< of elements that aren't flat: faces that no other such element
+                                         ///< has; ascending by element
+    std::vector<BoundaryFace>
+        lone;  ///< of elements that aren't flat: faces that no other element at all has; ascending by element
+    std::int64_t singleFaces = 0;        ///< faces of one element only, flat elements included
+    std::int64_t pairedFaces = 0;        ///< faces of exactly two elements, flat elements included
+    std::int64_t crowdedFaces = 0;       ///< faces of more than two elements, flat elements included
+    std::int64_t duplicateElements = 0;  ///< elements with the same four nodes as an earlier one
 };
 
 /// @param flat one entry an element, not 0: of zero volume. Throws InternalError above 2^30 elements.

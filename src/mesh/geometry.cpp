@@ -35,9 +35,11 @@ int volumeSign(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
     const double wx = std::fabs(w.x), wy = std::fabs(w.y), wz = std::fabs(w.z);
     const double sum = wx * (std::fabs(yz) + std::fabs(zy)) + wy * (std::fabs(zx) + std::fabs(xz)) +
                        wz * (std::fabs(xy) + std::fabs(yx));
-    // Each of the six monomials passes at most 8 roundings (3 differences, 2 products, 3 sums), and so does `sum`, so the error is at most
-    // ((1 + e)^8 - 1) / (1 - e)^8 < 9 e times `sum`, e = 2^-53; 10 e leaves room for the rounding of the bound itself. A product that
-    // underflows loses at most 2^-1075: the second term. Overflow makes the comparison false (infinity or NaN) and ends in the exact path.
+    // Each of the six monomials passes at most 8 roundings (3 differences, 2 products, 3 sums), and so does
+    // `sum`, so the error is at most
+    // ((1 + e)^8 - 1) / (1 - e)^8 < 9 e times `sum`, e = 2^-53; 10 e leaves room for the rounding of the
+    // bound itself. A product that underflows loses at most 2^-1075: the second term. Overflow makes the
+    // comparison false (infinity or NaN) and ends in the exact path.
     const double bound = 10 * 0x1p-53 * sum + 0x1p-1060 * (wx + wy + wz + 1);
     if (volume > bound) return 1;
     if (volume < -bound) return -1;
@@ -70,8 +72,9 @@ std::vector<BoundaryFace> boundaryFaces(const TetMesh& mesh, int threads) {
     parallelForChunks(execution, mesh.elementCount(), 1 << 14, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t e = begin; e < end; ++e) {
             const auto& tet = mesh.tets[std::size_t(e)];
-            flat[std::size_t(e)] = volumeSign(mesh.points[std::size_t(tet[0])], mesh.points[std::size_t(tet[1])],
-                                              mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]) == 0;
+            flat[std::size_t(e)] =
+                volumeSign(mesh.points[std::size_t(tet[0])], mesh.points[std::size_t(tet[1])],
+                           mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]) == 0;
         }
     });
     return matchFaces(mesh, flat, execution).boundary;

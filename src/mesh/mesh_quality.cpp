@@ -15,8 +15,8 @@ namespace {
 
 constexpr std::int64_t kChunk = 1 << 14;
 
-/// A node counts as lying on a face when it is this close to it, over the face's longest edge: about the rounding of coordinates that
-/// were stored as float.
+/// A node counts as lying on a face when it is this close to it, over the face's longest edge: about the
+/// rounding of coordinates that were stored as float.
 constexpr double kOnFace = 1e-6;
 
 struct Extremes {
@@ -36,7 +36,8 @@ struct Extremes {
     }
 };
 
-Extremes measureElements(const TetMesh& mesh, std::vector<std::uint8_t>& flat, std::int64_t begin, std::int64_t end) {
+Extremes measureElements(const TetMesh& mesh, std::vector<std::uint8_t>& flat, std::int64_t begin,
+                         std::int64_t end) {
     Extremes extremes;
     for (std::int64_t e = begin; e < end; ++e) {
         const auto& tet = mesh.tets[std::size_t(e)];
@@ -76,7 +77,7 @@ Extremes measureElements(const TetMesh& mesh, std::vector<std::uint8_t>& flat, c
 std::uint64_t hashPlace(const Vec3d& p) {
     std::uint64_t hash = 0;
     for (int k = 0; k < 3; ++k) {
-        hash ^= std::bit_cast<std::uint64_t>(p[k] + 0.0);   // -0 and 0 are one place
+        hash ^= std::bit_cast<std::uint64_t>(p[k] + 0.0);  // -0 and 0 are one place
         hash *= 0x9e3779b97f4a7c15ull;
         hash ^= hash >> 29;
     }
@@ -91,7 +92,8 @@ struct HashedNode {
     }
 };
 
-/// Which boundary faces have another boundary face at their place, given the first node at the place of every node.
+/// Which boundary faces have another boundary face at their place, given the first node at the place of every
+/// node.
 std::vector<std::uint8_t> findStackedFaces(const std::vector<BoundaryFace>& faces,
                                            const std::vector<std::int32_t>& firstNode) {
     struct Keyed {
@@ -116,8 +118,7 @@ bool liesOnFace(const std::array<Vec3d, 3>& corners, const Vec3d& point) {
     const Vec3d normal = glm::cross(u, v);
     const double area2 = glm::dot(normal, normal);
     if (!(area2 > 0)) return false;
-    const double longest =
-        std::sqrt(std::max({glm::dot(u, u), glm::dot(v, v), glm::dot(v - u, v - u)}));
+    const double longest = std::sqrt(std::max({glm::dot(u, u), glm::dot(v, v), glm::dot(v - u, v - u)}));
     if (std::fabs(glm::dot(w, normal)) > kOnFace * longest * std::sqrt(area2)) return false;
     // Distances inside of the three edges: weight times height.
     const double t1 = glm::dot(glm::cross(w, v), normal) / area2;
@@ -144,27 +145,29 @@ std::int64_t countInnerBoundary(const TetMesh& mesh, const std::vector<BoundaryF
     const BoxTree tree(places, execution);
 
     std::atomic<std::int64_t> inner{0};
-    parallelForChunks(execution, std::int64_t(faces.size()), 1 << 10, [&](std::int64_t begin, std::int64_t end) {
-        std::int64_t found = 0;
-        for (std::int64_t f = begin; f < end; ++f) {
-            const BoundaryFace& face = faces[std::size_t(f)];
-            std::array<Vec3d, 3> corners;
-            Box3d box;
-            for (std::size_t i = 0; i < 3; ++i) box.include(corners[i] = mesh.points[std::size_t(face.nodes[i])]);
-            const Vec3d size = box.size();
-            const double margin = kOnFace * std::max({size.x, size.y, size.z});
-            box.min -= Vec3d(margin);
-            box.max += Vec3d(margin);
-            bool hanging = stacked[std::size_t(f)];
-            tree.visitOverlaps(box, [&](std::int64_t place) {
-                const Vec3d& point = places[std::size_t(tree.order()[std::size_t(place)])].min;
-                hanging = hanging || (point != corners[0] && point != corners[1] && point != corners[2] &&
-                                      liesOnFace(corners, point));
-            });
-            found += hanging;
-        }
-        inner += found;
-    });
+    parallelForChunks(
+        execution, std::int64_t(faces.size()), 1 << 10, [&](std::int64_t begin, std::int64_t end) {
+            std::int64_t found = 0;
+            for (std::int64_t f = begin; f < end; ++f) {
+                const BoundaryFace& face = faces[std::size_t(f)];
+                std::array<Vec3d, 3> corners;
+                Box3d box;
+                for (std::size_t i = 0; i < 3; ++i)
+                    box.include(corners[i] = mesh.points[std::size_t(face.nodes[i])]);
+                const Vec3d size = box.size();
+                const double margin = kOnFace * std::max({size.x, size.y, size.z});
+                box.min -= Vec3d(margin);
+                box.max += Vec3d(margin);
+                bool hanging = stacked[std::size_t(f)];
+                tree.visitOverlaps(box, [&](std::int64_t place) {
+                    const Vec3d& point = places[std::size_t(tree.order()[std::size_t(place)])].min;
+                    hanging = hanging || (point != corners[0] && point != corners[1] && point != corners[2] &&
+                                          liesOnFace(corners, point));
+                });
+                found += hanging;
+            }
+            inner += found;
+        });
     return inner;
 }
 
@@ -182,7 +185,8 @@ std::vector<std::int32_t> firstNodeAtPlace(const std::vector<Vec3d>& points, con
     for (std::size_t b = 0; b < kBuckets; ++b) bucketBegin[b + 1] += bucketBegin[b];
     std::vector<HashedNode> nodes(points.size());
     auto cursor = bucketBegin;
-    for (std::size_t i = 0; i < hashes.size(); ++i) nodes[cursor[hashes[i] >> 56]++] = {hashes[i], std::int32_t(i)};
+    for (std::size_t i = 0; i < hashes.size(); ++i)
+        nodes[cursor[hashes[i] >> 56]++] = {hashes[i], std::int32_t(i)};
 
     std::vector<std::int32_t> first(points.size());
     parallelFor(execution, std::int64_t(kBuckets), [&](std::int64_t b) {

@@ -10,17 +10,17 @@ namespace tessera {
 
 /// The mesh point nearest to a place outside the mesh, as a blend of nodes of one element.
 struct NearestPoint {
-    std::int32_t element = -1;             ///< -1: none within the given distance
-    std::array<std::int32_t, 3> nodes{};   ///< boundary face
-    std::array<double, 3> weights{};       ///< in [0, 1], sum 1
+    std::int32_t element = -1;            ///< -1: none within the given distance
+    std::array<std::int32_t, 3> nodes{};  ///< boundary face
+    std::array<double, 3> weights{};      ///< in [0, 1], sum 1
     double distanceWorld = 0;
 
     /// The field's value there; NaN when it depends on a value that isn't finite.
     double value(const Field& field, int component) const;
 };
 
-/// Finds nearest points on the mesh boundary with a bounding volume hierarchy over the boundary faces. Ties go to the lowest
-/// element index, so results never depend on threads. Thread-safe after construction.
+/// Finds nearest points on the mesh boundary with a bounding volume hierarchy over the boundary faces. Ties
+/// go to the lowest element index, so results never depend on threads. Thread-safe after construction.
 class NearestPointIndex {
   public:
     explicit NearestPointIndex(const TetMesh& mesh, int threads = 0);

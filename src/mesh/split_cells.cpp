@@ -19,8 +19,9 @@ using Tet = std::array<std::int32_t, 4>;
 
 constexpr std::int64_t kCellChunk = 1 << 12;
 
-/// A fan is good when no triangle of it leans away from the face's normal by more than about 37 degrees, and its worst triangle isn't
-/// much smaller than that of the best fan. (On a snappyHexMesh mesh of warped octree cells, fans that lean fold their cells over.)
+/// A fan is good when no triangle of it leans away from the face's normal by more than about 37 degrees, and
+/// its worst triangle isn't much smaller than that of the best fan. (On a snappyHexMesh mesh of warped octree
+/// cells, fans that lean fold their cells over.)
 constexpr double kLeastCosine = 0.8;
 constexpr double kLeastShare = 0.05;
 
@@ -34,18 +35,31 @@ constexpr std::array<LocalFace, 5> kPyramidFaces{
     {{4, {0, 3, 2, 1}}, {3, {0, 1, 4, 0}}, {3, {1, 2, 4, 0}}, {3, {2, 3, 4, 0}}, {3, {3, 0, 4, 0}}}};
 constexpr std::array<LocalFace, 5> kWedgeFaces{
     {{3, {0, 1, 2, 0}}, {3, {3, 5, 4, 0}}, {4, {0, 3, 4, 1}}, {4, {1, 4, 5, 2}}, {4, {2, 5, 3, 0}}}};
-constexpr std::array<LocalFace, 6> kHexFaces{
-    {{4, {0, 4, 7, 3}}, {4, {1, 2, 6, 5}}, {4, {0, 1, 5, 4}}, {4, {3, 7, 6, 2}}, {4, {0, 3, 2, 1}}, {4, {4, 5, 6, 7}}}};
-constexpr std::array<LocalFace, 6> kVoxelFaces{
-    {{4, {0, 4, 6, 2}}, {4, {1, 3, 7, 5}}, {4, {0, 1, 5, 4}}, {4, {2, 6, 7, 3}}, {4, {0, 2, 3, 1}}, {4, {4, 5, 7, 6}}}};
+constexpr std::array<LocalFace, 6> kHexFaces{{{4, {0, 4, 7, 3}},
+                                              {4, {1, 2, 6, 5}},
+                                              {4, {0, 1, 5, 4}},
+                                              {4, {3, 7, 6, 2}},
+                                              {4, {0, 3, 2, 1}},
+                                              {4, {4, 5, 6, 7}}}};
+constexpr std::array<LocalFace, 6> kVoxelFaces{{{4, {0, 4, 6, 2}},
+                                                {4, {1, 3, 7, 5}},
+                                                {4, {0, 1, 5, 4}},
+                                                {4, {2, 6, 7, 3}},
+                                                {4, {0, 2, 3, 1}},
+                                                {4, {4, 5, 7, 6}}}};
 
 std::span<const LocalFace> facesOf(CellKind kind) {
     switch (kind) {
-        case CellKind::pyramid: return kPyramidFaces;
-        case CellKind::wedge: return kWedgeFaces;
-        case CellKind::hex: return kHexFaces;
-        case CellKind::voxel: return kVoxelFaces;
-        default: return {};
+        case CellKind::pyramid:
+            return kPyramidFaces;
+        case CellKind::wedge:
+            return kWedgeFaces;
+        case CellKind::hex:
+            return kHexFaces;
+        case CellKind::voxel:
+            return kVoxelFaces;
+        default:
+            return {};
     }
 }
 
@@ -70,7 +84,8 @@ class Splitter {
             nodes_.assign(nodes.begin(), nodes.end());
             for (const LocalFace& face : facesOf(kind)) {
                 polygon_.clear();
-                for (int i = 0; i < face.count; ++i) polygon_.push_back(nodes[std::size_t(face.nodes[std::size_t(i)])]);
+                for (int i = 0; i < face.count; ++i)
+                    polygon_.push_back(nodes[std::size_t(face.nodes[std::size_t(i)])]);
                 fanPolygon();
             }
         }
@@ -132,24 +147,29 @@ class Splitter {
 
     const std::vector<Vec3d>& points_;
     std::int32_t cell_ = 0;
-    std::vector<std::int32_t> nodes_;      // of the cell
-    std::vector<std::int32_t> polygon_;    // one face
-    std::vector<std::int32_t> grazing_;    // nodes that see a triangle of one of their own faces, mostly edge-on
-    std::vector<Triangle> triangles_;      // of all faces, counter-clockwise seen from outside
+    std::vector<std::int32_t> nodes_;    // of the cell
+    std::vector<std::int32_t> polygon_;  // one face
+    std::vector<std::int32_t>
+        grazing_;                      // nodes that see a triangle of one of their own faces, mostly edge-on
+    std::vector<Triangle> triangles_;  // of all faces, counter-clockwise seen from outside
 };
 
-/// The position in polygon_ that its triangles are fanned from: the smallest node if its fan is good, else the node whose worst triangle is
-/// largest. A triangle's share is its area seen along the face's normal: negative when it is folded over, as at a concave corner, 0 at a
-/// hanging node. Both cells at the face come to the same choice bit for bit, because all is computed from
-/// the smallest node towards its smaller neighbour.
+/// The position in polygon_ that its triangles are fanned from: the smallest node if its fan is good, else
+/// the node whose worst triangle is largest. A triangle's share is its area seen along the face's normal:
+/// negative when it is folded over, as at a concave corner, 0 at a hanging node. Both cells at the face come
+/// to the same choice bit for bit, because all is computed from the smallest node towards its smaller
+/// neighbour.
 std::size_t Splitter::chooseFanStart() const {
     const std::size_t n = polygon_.size();
     std::size_t smallest = 0;
     for (std::size_t i = 1; i < n; ++i)
         if (before(polygon_[i], polygon_[smallest])) smallest = i;
     if (n == 3) return smallest;
-    const std::size_t step = before(polygon_[(smallest + 1) % n], polygon_[(smallest + n - 1) % n]) ? 1 : n - 1;
-    const auto corner = [&](std::size_t k) -> const Vec3d& { return place(polygon_[(smallest + k * step) % n]); };
+    const std::size_t step =
+        before(polygon_[(smallest + 1) % n], polygon_[(smallest + n - 1) % n]) ? 1 : n - 1;
+    const auto corner = [&](std::size_t k) -> const Vec3d& {
+        return place(polygon_[(smallest + k * step) % n]);
+    };
     const auto triangleNormal = [&](std::size_t start, std::size_t i) {
         const Vec3d& a = corner(start);
         return glm::cross(corner(start + i) - a, corner(start + i + 1) - a);
@@ -163,7 +183,8 @@ std::size_t Splitter::chooseFanStart() const {
             const Vec3d triangle = triangleNormal(start, i);
             const double share = glm::dot(triangle, normal);
             worst = std::min(worst, share);
-            worstCosine2 = std::min(worstCosine2, share * std::fabs(share) / (glm::dot(triangle, triangle) * area2));
+            worstCosine2 =
+                std::min(worstCosine2, share * std::fabs(share) / (glm::dot(triangle, triangle) * area2));
         }
         return worst;
     };
@@ -178,7 +199,8 @@ std::size_t Splitter::chooseFanStart() const {
         best = k;
         bestShare = share;
     }
-    const bool good = smallestCosine2 >= kLeastCosine * kLeastCosine && smallestShare >= kLeastShare * bestShare;
+    const bool good =
+        smallestCosine2 >= kLeastCosine * kLeastCosine && smallestShare >= kLeastShare * bestShare;
     return good ? smallest : (smallest + best * step) % n;
 }
 
@@ -197,9 +219,9 @@ void Splitter::fanPolygon() {
     }
 }
 
-/// Emits the cone over the faces' triangles from the first of these that serves: a node, in coordinate order, from which every tet has the sign of
-/// the cell and none grazes a face; the centre; a node from which some tets are slivers, then flat; for a
-/// polyhedron the centre whatever it does; the smallest node as it is.
+/// Emits the cone over the faces' triangles from the first of these that serves: a node, in coordinate order,
+/// from which every tet has the sign of the cell and none grazes a face; the centre; a node from which some
+/// tets are slivers, then flat; for a polyhedron the centre whatever it does; the smallest node as it is.
 void Splitter::coneTriangles(bool isPolyhedron) {
     if (triangles_.empty()) return;
     const auto smaller = [&](std::int32_t a, std::int32_t b) { return before(a, b); };
@@ -218,8 +240,12 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     for (const std::int32_t node : nodes_) centre += place(node) - place(nodes_[0]);
     centre = place(nodes_[0]) + centre / double(nodes_.size());
     const double volume = volumeInside(centre);
-    const auto allKeepSign = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second < 0 : signs.first > 0; };
-    const auto noneInverted = [&](std::pair<int, int> signs) { return volume < 0 ? signs.second <= 0 : signs.first >= 0; };
+    const auto allKeepSign = [&](std::pair<int, int> signs) {
+        return volume < 0 ? signs.second < 0 : signs.first > 0;
+    };
+    const auto noneInverted = [&](std::pair<int, int> signs) {
+        return volume < 0 ? signs.second <= 0 : signs.first >= 0;
+    };
 
     std::int32_t withSlivers = -1, withFlat = -1;
     for (const std::int32_t node : nodes_) {
@@ -242,12 +268,13 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     emitCone(withSlivers >= 0 ? withSlivers : withFlat >= 0 ? withFlat : smallest);
 }
 
-/// Makes neighbouring faces run through their common edge in opposite directions: not every writer does. The majority of
-/// the faces keep their direction.
+/// Makes neighbouring faces run through their common edge in opposite directions: not every writer does. The
+/// majority of the faces keep their direction.
 void Splitter::orientFaces(std::vector<std::vector<std::int32_t>>& faces) const {
     std::map<std::pair<std::int32_t, std::int32_t>, std::vector<std::size_t>> facesOfEdge;
     const auto forEachEdge = [&](std::size_t f, const auto& visit) {
-        for (std::size_t i = 0; i < faces[f].size(); ++i) visit(faces[f][i], faces[f][(i + 1) % faces[f].size()]);
+        for (std::size_t i = 0; i < faces[f].size(); ++i)
+            visit(faces[f][i], faces[f][(i + 1) % faces[f].size()]);
     };
     for (std::size_t f = 0; f < faces.size(); ++f)
         forEachEdge(f, [&](std::int32_t a, std::int32_t b) { facesOfEdge[std::minmax(a, b)].push_back(f); });
@@ -316,12 +343,17 @@ void append(SplitCells& all, SplitCells& part, std::size_t pointCount) {
 
 int nodeCountOf(CellKind kind) {
     switch (kind) {
-        case CellKind::tet: return 4;
-        case CellKind::pyramid: return 5;
-        case CellKind::wedge: return 6;
+        case CellKind::tet:
+            return 4;
+        case CellKind::pyramid:
+            return 5;
+        case CellKind::wedge:
+            return 6;
         case CellKind::hex:
-        case CellKind::voxel: return 8;
-        case CellKind::polyhedron: break;
+        case CellKind::voxel:
+            return 8;
+        case CellKind::polyhedron:
+            break;
     }
     return 0;
 }
@@ -339,7 +371,8 @@ SplitCells splitCells(const std::vector<Vec3d>& points, const CellList& cells, c
         for (std::int64_t c = chunk * kCellChunk; c < end; ++c) {
             const auto first = std::size_t(cells.begin[std::size_t(c)]);
             const auto last = std::size_t(cells.begin[std::size_t(c) + 1]);
-            splitter.split(cells.kinds[std::size_t(c)], {cells.nodes.data() + first, last - first}, std::int32_t(c));
+            splitter.split(cells.kinds[std::size_t(c)], {cells.nodes.data() + first, last - first},
+                           std::int32_t(c));
         }
         parts[std::size_t(chunk)] = std::move(splitter.result);
     });

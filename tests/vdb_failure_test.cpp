@@ -1,0 +1,188 @@
+#include <sys/resource.h>
+
+#include <atomic>
+#include <csignal>
+
+#include "base/error.h"
+#include "io/atomic_file.h"
+#include "io/vdb_file.h"
+#include "vdb_case.h"
+
+namespace tessera {
+namespace {
+
+class VdbFailureTest : public VdbFileTest {};
+
+TEST_F(VdbFailureTest, NamesThatWouldClashAreRefused) {
+    EXPECT_THROW(checkOutputFields({{"coverage", "a", "point", 1, 0}}), InputError);
+    EXPECT_THROW(checkOutputFields({{"a", "a", "point", 1, 0}, {"a", "b", "point", 3, 1}}), InputError);
+    EXPECT_THROW(checkOutputFields({{"S", "a", "point", 2, 0}, {"S_1", "b", "point", 1, 2}}), InputError);
+    EXPECT_THROW(checkOutputFields({{"", "a", "point", 1, 0}}), InputError);
+    EXPECT_NO_THROW(checkOutputFields(kMixed));
+}
+
+TEST_F(VdbFailureTest, UnwritablePlacesAreRefusedAtOnce) {
+    EXPECT_THROW(checkWritable(file("missing/out.vdb")), IoError);
+    EXPECT_THROW(checkWritable(directory_.string()), IoError);
+    EXPECT_THROW(checkWritable(directory_.string() + "/"), IoError);
+    EXPECT_THROW(checkWritable(""), IoError);
+    EXPECT_THROW(checkWritable("/dev/null"), IoError);
+    EXPECT_THROW(checkWritable("/proc/out.vdb"), IoError);
+    EXPECT_THROW(checkWritable(file(std::string(300, 'x'))), IoError);
+    writeBytes(file("plain"), "x");
+    EXPECT_THROW(checkWritable(file("plain/out.vdb")), IoError);
+    EXPECT_NO_THROW(checkWritable(file("new.vdb")));
+    EXPECT_NO_THROW(checkWritable(file("plain")));
+    EXPECT_NO_THROW(checkWritable(file(std::string(250, 'x'))));
+    EXPECT_EQ(readBytes(file("plain")), "x");
+    EXPECT_EQ(fileCount(), 1u) << "a check leaves nothing behind";
+}
+
+// Lets no file grow beyond some bytes while it lives; a write past that fails as on a full disk.
+class FileSizeLimit {
+  public:
+    explicit FileSizeLimit(rlim_t bytes) {
+        previousHandler_ = std::signal(SIGXFSZ, SIG_IGN);
+        getrlimit(RLIMIT_FSIZE, &previous_);
+        const rlimit limit{bytes, previous_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FileSizeLimit() {
+        setrlimit(RLIMIT_FSIZE, &previous_);
+        std::signal(SIGXFSZ, previousHandler_);
+    }
+
+  private:
+    rlimit previous_{};
+    void (*previousHandler_)(int) = nullptr;
+};
+
+TEST_F(VdbFailureTest, FailedWriteLeavesTheOldFileAlone) {
+    writeBytes(file("out.vdb"), "precious");
+    for (rlim_t limit : {rlim_t(0), rlim_t(20), rlim_t(40), rlim_t(5000), rlim_t(200000)}) {
+        SCOPED_TRACE(limit);
+        for (const char* name : {"out.vdb", "new.vdb"}) {
+            BrickResult result = makeResult({0, 0, 0}, 1, 16, nestedLeaves(), 10);
+            const FileSizeLimit full(limit);
+            EXPECT_THROW(writeVdb(file(name), kMixed, result, nullptr, nullptr, {}, {}), IoError);
+        }
+        EXPECT_EQ(readBytes(file("out.vdb")), "precious");
+        EXPECT_EQ(fileCount(), 1u);
+    }
+}
+
+TEST_F(VdbFailureTest, CancelledWriteLeavesNothing) {
+    std::atomic<bool> cancel{true};
+    Execution execution;
+    execution.cancel = &cancel;
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
+    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, execution), Cancelled);
+    EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(VdbFailureTest, SymbolicLinkKeepsPointingAtTheFile) {
+    writeBytes(file("real.vdb"), "old");
+    fs::create_symlink(file("real.vdb"), file("link.vdb"));
+    writeFileAtomically(file("link.vdb"), "new");
+    EXPECT_TRUE(fs::is_symlink(file("link.vdb")));
+    EXPECT_EQ(readBytes(file("real.vdb")), "new");
+}
+
+TEST_F(VdbFailureTest, TemporaryFilesCanBeRemovedBySignalHandlers) {
+    AtomicFile open(file("out.vdb"));
+    open.writeAt(0, "abc", 3);
+    EXPECT_EQ(fileCount(), 1u);
+    removeTemporaryFiles();
+    EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(VdbFailureTest, DamagedFilesAreRefused) {
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
+    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    const std::string good = readBytes(file("out.vdb"));
+    for (std::size_t length : {std::size_t(0), std::size_t(5), std::size_t(21), std::size_t(56),
+                               std::size_t(57), std::size_t(1000), good.size() - 1}) {
+        writeBytes(file("cut.vdb"), good.substr(0, length));
+        EXPECT_THROW(readVdb(file("cut.vdb")), InputError) << length;
+        EXPECT_THROW(readVdbLattice(file("cut.vdb")), InputError) << length;
+    }
+    for (std::uint32_t i = 0; i < 300; ++i) {
+        std::string bad = good;
+        // Past the UUID, whose own damage can make the file look like another program's.
+        const std::size_t at = 57 + scramble(i) % (bad.size() - 57);
+        bad[at] = char(bad[at] ^ (1 << (i % 8)));
+        writeBytes(file("bad.vdb"), bad);
+        EXPECT_THROW(readVdb(file("bad.vdb")), InputError) << at;
+    }
+    writeBytes(file("noise.vdb"), std::string(1000, 'x'));
+    EXPECT_THROW(readVdb(file("noise.vdb")), InputError);
+    EXPECT_THROW(readVdb(file("missing.vdb")), InputError);
+    EXPECT_THROW(readVdb(directory_.string()), InputError);
+}
+
+TEST_F(VdbFailureTest, FilesOfOtherProgramsGiveTheirLattice) {
+    openvdb::initialize();
+    const openvdb::FloatGrid::Ptr grid = openvdb::FloatGrid::create(0.0f);
+    for (int i = 0; i < 100; ++i) grid->tree().setValueOn(openvdb::Coord(i, 3 * i, -i), float(i));
+    grid->setName("density");
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(0.25));
+    grid->transform().postTranslate(openvdb::Vec3d(1, -2, 3));
+    openvdb::io::File(file("other.vdb")).write(openvdb::GridPtrVec{grid});
+    const FixedFrame frame = readVdbLattice(file("other.vdb"));
+    EXPECT_EQ(frame.originWorld, Vec3d(1, -2, 3));
+    EXPECT_EQ(frame.spacingWorld, 0.25);
+    EXPECT_THROW(readVdb(file("other.vdb")), InputError);
+
+    grid->transform().preRotate(0.5, openvdb::math::X_AXIS);
+    openvdb::io::File(file("turned.vdb")).write(openvdb::GridPtrVec{grid});
+    EXPECT_THROW(readVdbLattice(file("turned.vdb")), InputError);
+    openvdb::io::File(file("empty.vdb")).write(openvdb::GridPtrVec{});
+    EXPECT_THROW(readVdbLattice(file("empty.vdb")), InputError);
+
+    // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never
+    // in a crash.
+    const std::string good = readBytes(file("other.vdb"));
+    for (std::uint32_t i = 0; i < 60; ++i) {
+        std::string bad = good;
+        for (std::uint32_t k = 0; k < 3; ++k)
+            bad[57 + scramble(i * 3 + k) % 400] = char(scramble(i + k) & 255);
+        writeBytes(file("bad.vdb"), bad);
+        try {
+            readVdbLattice(file("bad.vdb"));
+        } catch (const InputError&) {
+        }
+    }
+}
+
+TEST_F(VdbFailureTest, FileSavedAgainByAnotherProgramStillReads) {
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, valueAt, everywhere);
+    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
+    openvdb::io::File source(file("out.vdb"));
+    source.open(false);
+    const openvdb::MetaMap::Ptr metadata = source.getMetadata();
+    const openvdb::GridPtrVecPtr grids = source.getGrids();
+    // Full leaf nodes of the mask become tiles, as many tools do.
+    for (const openvdb::GridBase::Ptr& grid : *grids) grid->pruneGrid();
+    openvdb::io::File(file("again.vdb")).write(*grids, *metadata);
+    expectStored(readVdb(file("again.vdb")), 10, valueAt, everywhere);
+}
+
+TEST_F(VdbFailureTest, EmptyTreeGivesAFileWithoutVoxels) {
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, {}, 1);
+    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    EXPECT_EQ(readVdb(file("out.vdb")).tree.leafCount(), 0u);
+}
+
+TEST_F(VdbFailureTest, VdbPrintListsTheGrids) {
+    if (std::system("command -v vdb_print > /dev/null 2>&1") != 0)
+        GTEST_SKIP() << "vdb_print isn't installed";
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10);
+    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
+    ASSERT_EQ(std::system(("vdb_print -l " + file("out.vdb") + " > " + file("list.txt")).c_str()), 0);
+    const std::string list = readBytes(file("list.txt"));
+    for (const char* name : {"T_level_0", "U_level_3", "S_5_level_2", "coverage_level_1", "tessera_bricks"})
+        EXPECT_NE(list.find(name), std::string::npos) << name;
+}
+
+}  // namespace
+}  // namespace tessera
