@@ -11,32 +11,32 @@ namespace tessera {
 
 /// What was found while reading and splitting; counts are of elements (tets) unless they say cells or nodes.
 struct ImportStatistics {
-    std::string format;                      ///< e.g. "VTK XML unstructured grid"
-    std::int64_t cells = 0;                  ///< 3D cells read
-    std::int64_t skippedCells = 0;           ///< points, lines, surfaces and unsupported cells
-    std::int64_t blankedCells = 0;           ///< blanked, hidden or ghost: left out
-    std::int64_t higherOrderCells = 0;       ///< read by their corner nodes only
+    std::string format;                 ///< e.g. "VTK XML unstructured grid"
+    std::int64_t cells = 0;             ///< 3D cells read
+    std::int64_t skippedCells = 0;      ///< points, lines, surfaces and unsupported cells
+    std::int64_t blankedCells = 0;      ///< blanked, hidden or ghost: left out
+    std::int64_t higherOrderCells = 0;  ///< read by their corner nodes only
     std::int64_t blocks = 1;
-    std::int64_t addedNodes = 0;             ///< centres added to split polyhedra
+    std::int64_t addedNodes = 0;  ///< centres added to split polyhedra
     std::int64_t nodes = 0;
     std::int64_t elements = 0;
-    std::int64_t flat = 0;                   ///< exactly zero volume
-    std::int64_t inverted = 0;               ///< negative volume
-    std::int64_t duplicate = 0;              ///< same four nodes as an earlier element
-    std::int64_t coincidentNodes = 0;        ///< nodes at exactly the place of an earlier node
-    std::int64_t boundaryFaces = 0;          ///< faces of one element only
-    std::int64_t nonConformingFaces = 0;     ///< faces shared by more than two elements, and boundary faces
-                                             ///< that lie inside the mesh (a hanging node on them)
+    std::int64_t flat = 0;                ///< exactly zero volume
+    std::int64_t inverted = 0;            ///< negative volume
+    std::int64_t duplicate = 0;           ///< same four nodes as an earlier element
+    std::int64_t coincidentNodes = 0;     ///< nodes at exactly the place of an earlier node
+    std::int64_t boundaryFaces = 0;       ///< faces of one element only
+    std::int64_t nonConformingFaces = 0;  ///< faces shared by more than two elements, and boundary faces
+                                          ///< that lie inside the mesh (a hanging node on them)
     double smallestEdgeWorld = 0;
     double largestEdgeWorld = 0;
-    double smallestVolumeWorld = 0;          ///< |volume| of elements that are not flat
+    double smallestVolumeWorld = 0;  ///< |volume| of elements that are not flat
     double largestVolumeWorld = 0;
-    std::vector<std::string> warnings;       ///< one sentence each
+    std::vector<std::string> warnings;  ///< one sentence each
 };
 
 struct ReadOptions {
-    std::vector<std::string> fields;   ///< names to read; empty: all
-    int timeStep = -1;                 ///< formats with steps: which one, counted from 0; -1: the last
+    std::vector<std::string> fields;  ///< names to read; empty: all
+    int timeStep = -1;                ///< formats with steps: which one, counted from 0; -1: the last
 };
 
 struct MeshFile {
@@ -44,17 +44,20 @@ struct MeshFile {
     ImportStatistics statistics;
 };
 
-/// Reads a mesh in any supported format (docs/formats in README): cells are split into tetrahedra so that both sides of a
-/// shared face take the same diagonal; points stay double.
-/// Throws InputError, naming the file and the place, when the file is missing, empty, damaged, of unknown format, has no 3D cells, a node
-/// index out of range, a coordinate that isn't finite (says which node), a non-numeric array or no such field (lists those there).
+/// Reads a mesh in any supported format (docs/formats in README): cells are split into tetrahedra so that
+/// both sides of a shared face take the same diagonal; points stay double. Field names are unique: where
+/// points and cells have a field of one name, that of the cells gets the suffix "_cell". Throws InputError,
+/// naming the file and the place, when the file is missing, empty, damaged, of unknown format, has no 3D
+/// cells, a node index out of range, a coordinate that isn't finite (says which node), a non-numeric array or
+/// no such field (lists those there).
 MeshFile readMesh(const std::string& path, const ReadOptions& options, const Execution& execution);
 
-/// The files of a time series, in order: a pattern with * or ?, a .pvd file, or a single mesh file. Throws InputError when none matches.
+/// The files of a time series, in order: a pattern with * or ?, a .pvd file, or a single mesh file. Throws
+/// InputError when none matches.
 std::vector<std::string> listSeries(const std::string& pathOrPattern);
 
-/// Writes the elements and fields as appended, zlib-compressed .vtu with points in double, for checks by other programs. Atomic: nothing
-/// stands at `path` until the file is whole. Throws IoError.
+/// Writes the elements and fields as appended, zlib-compressed .vtu with points in double, for checks by
+/// other programs. Atomic: nothing stands at `path` until the file is whole. Throws IoError.
 void writeTets(const TetMesh& mesh, const std::string& path);
 
 }  // namespace tessera

@@ -25,7 +25,8 @@ void checkMesh(const TetMesh& mesh) {
         for (const std::int32_t node : tet)
             TESSERA_CHECK(node >= 0 && node < nodes, "an element's node index is out of range");
     for (const Field& field : mesh.fields) {
-        TESSERA_CHECK(field.components >= 1 && field.components <= 9, "a field has 1 to 9 components: " + field.name);
+        TESSERA_CHECK(field.components >= 1 && field.components <= 9,
+                      "a field has 1 to 9 components: " + field.name);
         const std::int64_t items = field.location == FieldLocation::point ? nodes : mesh.elementCount();
         TESSERA_CHECK(std::int64_t(field.values.size()) == items * field.components,
                       "a field's size does not fit the mesh: " + field.name);
@@ -34,7 +35,8 @@ void checkMesh(const TetMesh& mesh) {
 
 ValueRange fieldRange(const Field& field, int component) {
     ValueRange range;
-    for (std::size_t i = std::size_t(component); i < field.values.size(); i += std::size_t(field.components)) {
+    for (std::size_t i = std::size_t(component); i < field.values.size();
+         i += std::size_t(field.components)) {
         const double v = field.values[i];
         if (!std::isfinite(v)) continue;
         if (v < range.min) range.min = v;

@@ -285,9 +285,12 @@ def check_mesh(tool, mesh, resolution, folder):
 
 
 def list_meshes(folders):
+    """Each mesh once: the bundled ones also stand among the larger collection, in folders of the same names."""
+    seen = set()
     for folder in folders:
         for path in sorted(pathlib.Path(folder).rglob("*")):
-            if path.suffix in MESH_SUFFIXES and path.is_file():
+            if path.suffix in MESH_SUFFIXES and path.is_file() and (path.parent.name, path.name) not in seen:
+                seen.add((path.parent.name, path.name))
                 yield path
 
 
