@@ -28,7 +28,11 @@ TEST(ParallelFor, rethrowsTheBodysException) {
     for (const int threads : {1, 4}) {
         Execution execution;
         execution.threads = threads;
-        EXPECT_THROW(parallelFor(execution, 100, [](std::int64_t i) { if (i == 50) throw InputError("fifty"); }), InputError);
+        EXPECT_THROW(parallelFor(execution, 100,
+                                 [](std::int64_t i) {
+                                     if (i == 50) throw InputError("fifty");
+                                 }),
+                     InputError);
     }
 }
 

@@ -28,7 +28,8 @@ TEST(NodeFrame, keepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
         TetMesh mesh;
         std::uniform_real_distribution<double> uniform(-1, 1);
         for (int i = 0; i < 200; ++i)
-            mesh.points.push_back({offset + uniform(random), offset + 1e-3 * uniform(random), 1e5 * uniform(random)});
+            mesh.points.push_back(
+                {offset + uniform(random), offset + 1e-3 * uniform(random), 1e5 * uniform(random)});
         for (const double spacing : {1.0, 0.1, 1.0 / 3, 1e-3, 12345.678}) {
             const NodeFrame frame =
                 frameNodes(mesh, Lattice::axisParallel({offset + 0.1, offset - 0.7, 0.3}, spacing), {});
@@ -52,7 +53,7 @@ TEST(NodeFrame, turnedLatticesAreAsAccurate) {
 TEST(ElementDepth, isTheDistanceToTheNearestFacePlane) {
     TetMesh mesh;
     mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
-    mesh.tets = {{0, 1, 2, 3}, {1, 0, 2, 3}};   // both orientations
+    mesh.tets = {{0, 1, 2, 3}, {1, 0, 2, 3}};  // both orientations
     const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
     for (const std::int32_t element : {0, 1}) {
         const ElementDepth depth(mesh, frame, element);
@@ -86,23 +87,29 @@ TEST(ElementBins, holdEveryElementWhoseBoxHasAPointOfTheRegion) {
         }
         mesh.tets.push_back(tet);
     }
-    const std::vector<IndexBox> regions{{{0, 0, 0}, {16, 16, 16}}, {{16, 0, 0}, {48, 32, 32}}, {{8, 8, 8}, {24, 24, 9}},
-                                        {{60, 60, 60}, {61, 61, 61}}, {{-4, 30, 0}, {13, 47, 64}}};
+    const std::vector<IndexBox> regions{{{0, 0, 0}, {16, 16, 16}},
+                                        {{16, 0, 0}, {48, 32, 32}},
+                                        {{8, 8, 8}, {24, 24, 9}},
+                                        {{60, 60, 60}, {61, 61, 61}},
+                                        {{-4, 30, 0}, {13, 47, 64}}};
     const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
     const ElementBins bins = binElements(mesh, frame, regions, {});
     for (std::size_t r = 0; r < regions.size(); ++r) {
         const auto listed = bins.of(r);
         EXPECT_TRUE(std::is_sorted(listed.begin(), listed.end()));
-        EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end()), listed.end()) << "an element stands twice";
+        EXPECT_EQ(std::adjacent_find(listed.begin(), listed.end()), listed.end())
+            << "an element stands twice";
         for (std::int32_t e = 0; e < mesh.elementCount(); ++e) {
             Box3d box;
-            for (const std::int32_t node : mesh.tets[std::size_t(e)]) box.include(mesh.points[std::size_t(node)]);
+            for (const std::int32_t node : mesh.tets[std::size_t(e)])
+                box.include(mesh.points[std::size_t(node)]);
             bool holds = true;
             for (int a = 0; a < 3; ++a)
                 holds = holds && std::max(std::ceil(box.min[a]), double(regions[r].min[a])) <=
                                      std::min(std::floor(box.max[a]), double(regions[r].max[a] - 1));
             if (holds) {
-                EXPECT_TRUE(std::binary_search(listed.begin(), listed.end(), e)) << "element " << e << " region " << r;
+                EXPECT_TRUE(std::binary_search(listed.begin(), listed.end(), e))
+                    << "element " << e << " region " << r;
             }
         }
     }
@@ -114,7 +121,8 @@ TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
     mesh.tets = {{0, 1, 2, 3}};
     const SoftwareResampler software;
     const auto bound = software.bind(mesh, {}, {});
-    const std::vector<IndexBox> boxes{{{0, 0, 0}, {9, 9, 9}}, {{3, 3, 3}, {3, 9, 9}}, {{100, 100, 100}, {108, 108, 108}}};
+    const std::vector<IndexBox> boxes{
+        {{0, 0, 0}, {9, 9, 9}}, {{3, 3, 3}, {3, 9, 9}}, {{100, 100, 100}, {108, 108, 108}}};
     std::vector<int> calls(boxes.size(), 0);
     Execution execution;
     execution.threads = 1;
@@ -127,7 +135,7 @@ TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
         },
         execution);
     EXPECT_EQ(calls, (std::vector<int>{1, 1, 1}));
-    EXPECT_EQ(statistics.coveredPoints, 165);   // points with i + j + k <= 8: 11 choose 3
+    EXPECT_EQ(statistics.coveredPoints, 165);  // points with i + j + k <= 8: 11 choose 3
 }
 
 TEST(SoftwareResampler, refusesLatticesThatCannotBe) {
@@ -137,7 +145,8 @@ TEST(SoftwareResampler, refusesLatticesThatCannotBe) {
     const IndexBox box{{0, 0, 0}, {1, 1, 1}};
     const auto ignore = [](std::size_t, const Block&) {};
     for (const double spacing : {0.0, double(NAN), double(INFINITY)})
-        EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, spacing), {&box, 1}, ignore, {}), InputError);
+        EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, spacing), {&box, 1}, ignore, {}),
+                     InputError);
     const IndexBox far{{0, 0, 0}, {(1 << 30) + 1, 1, 1}};
     EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, 1), {&far, 1}, ignore, {}), InputError);
 }
@@ -146,7 +155,8 @@ TEST(SoftwareResampler, aTargetThatIsAskedForRuns) {
     TetMesh mesh;
     const SoftwareResampler software;
     ASSERT_FALSE(software.targets().empty());
-    for (const std::string& target : software.targets()) EXPECT_EQ(software.bind(mesh, {}, target)->target(), target);
+    for (const std::string& target : software.targets())
+        EXPECT_EQ(software.bind(mesh, {}, target)->target(), target);
     EXPECT_EQ(software.bind(mesh, {}, {})->target(), software.targets().front());
     EXPECT_THROW(software.bind(mesh, {}, "no such"), InputError);
 }

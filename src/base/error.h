@@ -35,7 +35,8 @@ class InternalError : public std::logic_error {
     using std::logic_error::logic_error;
 };
 
-[[noreturn]] void throwInternalError(const char* condition, const char* file, int line, const std::string& note);
+[[noreturn]] void throwInternalError(const char* condition, const char* file, int line,
+                                     const std::string& note);
 
 }  // namespace tessera
 

@@ -28,7 +28,8 @@ void Execution::throwIfCancelled() const {
 #ifdef TESSERA_STD_THREADS
 
 // ThreadSanitizer can't see through Debian's TBB, so its build runs loops on plain threads.
-void parallelFor(const Execution& execution, std::int64_t count, const std::function<void(std::int64_t)>& body) {
+void parallelFor(const Execution& execution, std::int64_t count,
+                 const std::function<void(std::int64_t)>& body) {
     const int threads = int(std::min<std::int64_t>(execution.threadCount(), count));
     std::atomic<std::int64_t> next{0};
     std::exception_ptr failure;
@@ -54,7 +55,8 @@ void parallelFor(const Execution& execution, std::int64_t count, const std::func
 
 #else
 
-void parallelFor(const Execution& execution, std::int64_t count, const std::function<void(std::int64_t)>& body) {
+void parallelFor(const Execution& execution, std::int64_t count,
+                 const std::function<void(std::int64_t)>& body) {
     if (count <= 0) return;
     const int threads = execution.threadCount();
     if (threads == 1 || count == 1) {
@@ -64,7 +66,8 @@ void parallelFor(const Execution& execution, std::int64_t count, const std::func
         }
         return;
     }
-    // More threads than processors are honoured too: results must not depend on the number, and tests ask for it.
+    // More threads than processors are honoured too: results must not depend on the number, and tests ask for
+    // it.
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
     tbb::task_arena arena(threads);
     std::atomic<std::int64_t> next{0};

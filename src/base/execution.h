@@ -17,9 +17,9 @@ class ProgressSink {
 
 /// How long work runs: threads, cancellation, progress. Results never depend on it.
 struct Execution {
-    int threads = 0;                             ///< worker threads; 0: one for every processor
-    const std::atomic<bool>* cancel = nullptr;   ///< when it turns true, work stops with Cancelled
-    ProgressSink* progress = nullptr;            ///< may be null
+    int threads = 0;                            ///< worker threads; 0: one for every processor
+    const std::atomic<bool>* cancel = nullptr;  ///< when it turns true, work stops with Cancelled
+    ProgressSink* progress = nullptr;           ///< may be null
 
     int threadCount() const;
     void throwIfCancelled() const;
@@ -30,10 +30,11 @@ struct Execution {
 
 /// Calls body(i) once for every i in [0, count), in any order, on any thread. The first exception stops the
 /// loop and is rethrown. Checks for cancellation between items.
-void parallelFor(const Execution& execution, std::int64_t count, const std::function<void(std::int64_t)>& body);
+void parallelFor(const Execution& execution, std::int64_t count,
+                 const std::function<void(std::int64_t)>& body);
 
-/// Calls body(begin, end) on fixed chunks of `chunk` items of [0, count): chunk borders, and so any per-chunk result, do not
-/// depend on the number of threads.
+/// Calls body(begin, end) on fixed chunks of `chunk` items of [0, count): chunk borders, and so any per-chunk
+/// result, do not depend on the number of threads.
 void parallelForChunks(const Execution& execution, std::int64_t count, std::int64_t chunk,
                        const std::function<void(std::int64_t, std::int64_t)>& body);
 

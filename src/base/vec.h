@@ -50,7 +50,11 @@ inline IndexBox intersect(const IndexBox& a, const IndexBox& b) {
 }
 
 /// Floor division by a positive divisor.
-inline int floorDiv(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
-inline Vec3i floorDiv(const Vec3i& a, int b) { return {floorDiv(a.x, b), floorDiv(a.y, b), floorDiv(a.z, b)}; }
+inline int floorDiv(int a, int b) {
+    return a >= 0 ? a / b : -((-a + b - 1) / b);
+}
+inline Vec3i floorDiv(const Vec3i& a, int b) {
+    return {floorDiv(a.x, b), floorDiv(a.y, b), floorDiv(a.z, b)};
+}
 
 }  // namespace tessera

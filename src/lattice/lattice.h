@@ -6,8 +6,9 @@
 
 namespace tessera {
 
-/// A frame of sample points: lattice point (i, j, k) is the real number origin + i u + j v + k w, never its rounding.
-/// Bricks use axis-parallel frames with one spacing; a cut plane is a frame of any orientation used with one layer.
+/// A frame of sample points: lattice point (i, j, k) is the real number origin + i u + j v + k w, never its
+/// rounding. Bricks use axis-parallel frames with one spacing; a cut plane is a frame of any orientation used
+/// with one layer.
 struct Lattice {
     Vec3d originWorld{0};
     Vec3d uWorld{1, 0, 0};

@@ -13,11 +13,12 @@ ResampleStatistics& ResampleStatistics::operator+=(const ResampleStatistics& oth
     return *this;
 }
 
-Block resampleBlock(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields, const Lattice& lattice,
-                    const IndexBox& box, const Execution& execution) {
+Block resampleBlock(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,
+                    const Lattice& lattice, const IndexBox& box, const Execution& execution) {
     Block result;
     const auto bound = resampler.bind(mesh, fields);
-    bound->resample(lattice, std::span(&box, 1), [&](std::size_t, const Block& block) { result = block; }, execution);
+    bound->resample(
+        lattice, std::span(&box, 1), [&](std::size_t, const Block& block) { result = block; }, execution);
     return result;
 }
 

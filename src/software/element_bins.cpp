@@ -4,6 +4,10 @@
 #include <bit>
 #include <cmath>
 
+#if defined(__SSE2__)
+#include <emmintrin.h>
+#endif
+
 namespace tessera {
 
 namespace {
@@ -30,7 +34,7 @@ class RegionGrid {
         for (int a = 0; a < 3; ++a) {
             const int extent = bounds_.max[a] - bounds_.min[a];
             const int edge = std::max(smallest[a], (extent + kMostCells - 1) / kMostCells);
-            shift_[a] = std::bit_width(unsigned(edge) - 1);   // a power of two: this runs for every element
+            shift_[a] = std::bit_width(unsigned(edge) - 1);  // a power of two: this runs for every element
             cells_[a] = ((extent - 1) >> shift_[a]) + 1;
             cells *= std::size_t(cells_[a]);
         }
@@ -45,7 +49,8 @@ class RegionGrid {
 
     const IndexBox& bounds() const { return bounds_; }
 
-    // Calls found(region) once for every region that shares a lattice point with the closed box low..high inside bounds().
+    // Calls found(region) once for every region that shares a lattice point with the closed box low..high
+    // inside bounds().
     template <class Found>
     void forEachRegion(const Vec3i& low, const Vec3i& high, const Found& found) const {
         const Vec3i a = cellOf(low), b = cellOf(high);
@@ -57,8 +62,8 @@ class RegionGrid {
                         const std::int32_t region = list_[std::size_t(i)];
                         const IndexBox& box = regions_[std::size_t(region)];
                         const Vec3i corner = glm::max(low, box.min);
-                        if (high.x < box.min.x || high.y < box.min.y || high.z < box.min.z || low.x >= box.max.x ||
-                            low.y >= box.max.y || low.z >= box.max.z)
+                        if (high.x < box.min.x || high.y < box.min.y || high.z < box.min.z ||
+                            low.x >= box.max.x || low.y >= box.max.y || low.z >= box.max.z)
                             continue;
                         // A region that shares several cells with the box counts in the first only.
                         if (cellOf(corner) == Vec3i{x, y, z}) found(region);
@@ -70,7 +75,8 @@ class RegionGrid {
     static constexpr int kMostCells = 128;
 
     Vec3i cellOf(const Vec3i& p) const {
-        return {(p.x - bounds_.min.x) >> shift_.x, (p.y - bounds_.min.y) >> shift_.y, (p.z - bounds_.min.z) >> shift_.z};
+        return {(p.x - bounds_.min.x) >> shift_.x, (p.y - bounds_.min.y) >> shift_.y,
+                (p.z - bounds_.min.z) >> shift_.z};
     }
     std::size_t index(const Vec3i& cell) const {
         return (std::size_t(cell.z) * std::size_t(cells_.y) + std::size_t(cell.y)) * std::size_t(cells_.x) +
@@ -92,39 +98,58 @@ class RegionGrid {
     std::vector<std::int32_t> first_, list_;
 };
 
-// Without SSE4 the library's floor and ceil are calls; values here fit an int.
-int ceilToInt(float x) {
-    const int whole = int(x);
-    return whole + (float(whole) < x);
-}
-int floorToInt(float x) {
-    const int whole = int(x);
-    return whole - (float(whole) > x);
-}
+// Bounds in lattice points; the fourth number is padding.
+struct alignas(16) LatticeBounds {
+    std::int32_t low[4], high[4];
+};
 
-// Bounds of an element in lattice points from the rounded node places, widened by their rounding. False when they hold none in `bounds`.
-bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, const IndexBox& bounds, Vec3i& low,
-                   Vec3i& high) {
-    const float* n0 = frame.rough[std::size_t(tet[0])].data();
-    const float* n1 = frame.rough[std::size_t(tet[1])].data();
-    const float* n2 = frame.rough[std::size_t(tet[2])].data();
-    const float* n3 = frame.rough[std::size_t(tet[3])].data();
-    float least[4], most[4];
-    for (int a = 0; a < 4; ++a) {
-        const float minimum = std::min(std::min(n0[a], n1[a]), std::min(n2[a], n3[a]));
-        const float maximum = std::max(std::max(n0[a], n1[a]), std::max(n2[a], n3[a]));
-        least[a] = minimum - (std::fabs(minimum) * 0x1p-22f + 0x1p-26f);
-        most[a] = maximum + (std::fabs(maximum) * 0x1p-22f + 0x1p-26f);
-    }
-    for (int a = 0; a < 3; ++a) {
-        // Clamped to the int range's better half first: nodes may lie anywhere.
-        const float from = std::clamp(least[a], -0x1p30f - 2048.0f, 0x1p30f + 2048.0f);
-        const float to = std::clamp(most[a], -0x1p30f - 2048.0f, 0x1p30f + 2048.0f);
-        low[a] = std::max(ceilToInt(from), bounds.min[a]);
-        high[a] = std::min(floorToInt(to), bounds.max[a] - 1);
-    }
-    return low.x <= high.x && low.y <= high.y && low.z <= high.z;
+// Nodes may lie anywhere; what is beyond every lattice index is cut to just beyond it, so that it fits an
+// int.
+constexpr float kFarthest = 0x1p30f + 2048.0f;
+
+// Bounds of an element in lattice points from the rounded node places, widened by their rounding. False when
+// they hold none.
+#if defined(__SSE2__)
+bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, LatticeBounds& bounds) {
+    const auto place = [&](std::size_t k) { return _mm_load_ps(frame.rough[std::size_t(tet[k])].index); };
+    const __m128 n0 = place(0), n1 = place(1), n2 = place(2), n3 = place(3);
+    const __m128 least = _mm_min_ps(_mm_min_ps(n0, n1), _mm_min_ps(n2, n3));
+    const __m128 most = _mm_max_ps(_mm_max_ps(n0, n1), _mm_max_ps(n2, n3));
+    const __m128 magnitude = _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)), unit = _mm_set1_ps(0x1p-22f),
+                 tiny = _mm_set1_ps(0x1p-26f);
+    const auto slack = [&](__m128 x) { return _mm_add_ps(_mm_mul_ps(_mm_and_ps(x, magnitude), unit), tiny); };
+    const auto cut = [](__m128 x) {
+        return _mm_max_ps(_mm_min_ps(x, _mm_set1_ps(kFarthest)), _mm_set1_ps(-kFarthest));
+    };
+    const __m128 from = cut(_mm_sub_ps(least, slack(least))), to = cut(_mm_add_ps(most, slack(most)));
+    // Ceil and floor: truncate, then correct where that went the wrong way (a true comparison is the integer
+    // -1).
+    const __m128i fromCut = _mm_cvttps_epi32(from), toCut = _mm_cvttps_epi32(to);
+    const __m128i low =
+        _mm_sub_epi32(fromCut, _mm_castps_si128(_mm_cmplt_ps(_mm_cvtepi32_ps(fromCut), from)));
+    const __m128i high = _mm_add_epi32(toCut, _mm_castps_si128(_mm_cmpgt_ps(_mm_cvtepi32_ps(toCut), to)));
+    _mm_store_si128(reinterpret_cast<__m128i*>(bounds.low), low);
+    _mm_store_si128(reinterpret_cast<__m128i*>(bounds.high), high);
+    return _mm_movemask_epi8(_mm_cmpgt_epi32(low, high)) == 0;
 }
+#else
+bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, LatticeBounds& bounds) {
+    bool some = true;
+    for (int a = 0; a < 3; ++a) {
+        float least = frame.rough[std::size_t(tet[0])].index[a], most = least;
+        for (std::size_t k = 1; k < 4; ++k) {
+            least = std::min(least, frame.rough[std::size_t(tet[k])].index[a]);
+            most = std::max(most, frame.rough[std::size_t(tet[k])].index[a]);
+        }
+        least -= std::fabs(least) * 0x1p-22f + 0x1p-26f;
+        most += std::fabs(most) * 0x1p-22f + 0x1p-26f;
+        bounds.low[a] = std::int32_t(std::ceil(std::clamp(least, -kFarthest, kFarthest)));
+        bounds.high[a] = std::int32_t(std::floor(std::clamp(most, -kFarthest, kFarthest)));
+        some = some && bounds.low[a] <= bounds.high[a];
+    }
+    return some;
+}
+#endif
 
 }  // namespace
 
@@ -134,6 +159,7 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
     bins.first.assign(regions.size() + 1, 0);
     if (regions.empty()) return bins;
     const RegionGrid grid(regions);
+    const IndexBox& all = grid.bounds();
     const std::int64_t elements = mesh.elementCount();
     const std::int64_t chunk = std::max<std::int64_t>(4096, elements / (8 * execution.threadCount()) + 1);
     const std::size_t chunks = std::size_t((elements + chunk - 1) / chunk);
@@ -145,11 +171,14 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
         count.assign(regions.size(), 0);
         found.reserve(std::size_t(end - begin));
         for (std::int64_t e = begin; e < end; ++e) {
-            if (e + kAhead < end)   // elements come in no order that caches could guess
+            if (e + kAhead < end)  // elements come in no order that caches could guess
                 for (const std::int32_t node : mesh.tets[std::size_t(e + kAhead)])
-                    __builtin_prefetch(frame.rough[std::size_t(node)].data());
-            Vec3i low, high;
-            if (!latticeBounds(frame, mesh.tets[std::size_t(e)], grid.bounds(), low, high)) continue;
+                    __builtin_prefetch(&frame.rough[std::size_t(node)]);
+            LatticeBounds bounds;
+            if (!latticeBounds(frame, mesh.tets[std::size_t(e)], bounds)) continue;
+            const Vec3i low = glm::max(Vec3i{bounds.low[0], bounds.low[1], bounds.low[2]}, all.min);
+            const Vec3i high = glm::min(Vec3i{bounds.high[0], bounds.high[1], bounds.high[2]}, all.max - 1);
+            if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
             grid.forEachRegion(low, high, [&](std::int32_t region) {
                 found.push_back({region, std::int32_t(e)});
                 ++count[std::size_t(region)];

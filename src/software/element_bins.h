@@ -12,7 +12,7 @@ namespace tessera {
 
 /// For every region the elements whose bounding boxes hold one of its lattice points, ascending.
 struct ElementBins {
-    std::vector<std::int64_t> first;        ///< regions + 1 offsets into `elements`
+    std::vector<std::int64_t> first;  ///< regions + 1 offsets into `elements`
     std::vector<std::int32_t> elements;
 
     std::span<const std::int32_t> of(std::size_t region) const {
@@ -20,8 +20,8 @@ struct ElementBins {
     }
 };
 
-/// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice point in their
-/// (slightly widened) bounding box appear nowhere.
+/// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice
+/// point in their (slightly widened) bounding box appear nowhere.
 ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
                         const Execution& execution);
 

@@ -11,10 +11,15 @@ constexpr double kDouble = 0x1p-53;
 constexpr double kQuad = 0x1p-112;
 constexpr double kDepthAccuracy = 0x1p-16;
 
-double magnitude(double x) { return std::fabs(x); }
-Quad magnitude(Quad x) { return x < 0 ? -x : x; }
+double magnitude(double x) {
+    return std::fabs(x);
+}
+Quad magnitude(Quad x) {
+    return x < 0 ? -x : x;
+}
 
-// Face planes from nodes relative to the first voxel. False when rounding could move a plane by more than kDepthAccuracy.
+// Face planes from nodes relative to the first voxel. False when rounding could move a plane by more than
+// kDepthAccuracy.
 template <class Real>
 bool facePlanes(const Real (&v)[4][3], double unit, double (&normal)[4][3], double (&offset)[4]) {
     double size = 0;
@@ -65,7 +70,8 @@ ElementDepth::ElementDepth(const TetMesh& mesh, const NodeFrame& frame, std::int
     const auto& tet = mesh.tets[std::size_t(element)];
     for (int a = 0; a < 3; ++a) {
         base_[a] = frame.nodes[std::size_t(tet[0])].whole[a];
-        for (std::size_t k = 1; k < 4; ++k) base_[a] = std::min(base_[a], frame.nodes[std::size_t(tet[k])].whole[a]);
+        for (std::size_t k = 1; k < 4; ++k)
+            base_[a] = std::min(base_[a], frame.nodes[std::size_t(tet[k])].whole[a]);
     }
     double v[4][3];
     for (std::size_t k = 0; k < 4; ++k) {
@@ -86,12 +92,15 @@ double ElementDepth::at(const Vec3i& point) const {
     const double x = point.x - base_[0], y = point.y - base_[1], z = point.z - base_[2];
     double depth = INFINITY;
     for (int face = 0; face < 4; ++face) {
-        const double d = ((normal_[face][0] * x + normal_[face][1] * y) + normal_[face][2] * z) + offset_[face];
+        const double d =
+            ((normal_[face][0] * x + normal_[face][1] * y) + normal_[face][2] * z) + offset_[face];
         if (d < depth) depth = d;
     }
     return depth;
 }
 
-double ElementDepth::rank(const Vec3i& point) const { return std::floor(at(point) * 0x1p13 + 0.5); }
+double ElementDepth::rank(const Vec3i& point) const {
+    return std::floor(at(point) * 0x1p13 + 0.5);
+}
 
 }  // namespace tessera

@@ -1,4 +1,5 @@
-// Elements too thin for double precision: the same walk in 113-bit arithmetic and, where even that is too coarse, in rationals.
+// Elements too thin for double precision: the same walk in 113-bit arithmetic and, where even that is too
+// coarse, in rationals.
 
 #include <algorithm>
 #include <array>
@@ -14,8 +15,12 @@ namespace tessera {
 
 namespace {
 
-double toDouble(Quad x) { return double(x); }
-double toDouble(const mpq_class& x) { return x.get_d(); }
+double toDouble(Quad x) {
+    return double(x);
+}
+double toDouble(const mpq_class& x) {
+    return x.get_d();
+}
 
 double floorToDouble(Quad x) {
     const double rounded = double(x);
@@ -37,7 +42,8 @@ Real absolute(const Real& x) {
     return x < 0 ? Real(-x) : x;
 }
 
-// An element in index coordinates relative to its first voxel, and its barycentrics constant + gradient . (x, y, z).
+// An element in index coordinates relative to its first voxel, and its barycentrics constant + gradient . (x,
+// y, z).
 template <class Real>
 struct ExactElement {
     double base[3];
@@ -45,7 +51,7 @@ struct ExactElement {
     Real low[3], high[3];
     Real gradient[4][3];
     Real constant[4];
-    Real dilation;   // bound on the rounding of a barycentric coordinate
+    Real dilation;  // bound on the rounding of a barycentric coordinate
 };
 
 // Gives the determinant, six times the volume in voxels; gradients only when it isn't zero.
@@ -104,7 +110,8 @@ bool setUp(const ScanInput& input, std::int32_t element, ExactElement<Quad>& e) 
     const Quad unit = 0x1p-112;
     Quad steepest = 0, boxVolume = 1, size = 0, longest = 0;
     for (int k = 0; k < 4; ++k)
-        steepest = std::max(steepest, absolute(e.gradient[k][0]) + absolute(e.gradient[k][1]) + absolute(e.gradient[k][2]));
+        steepest = std::max(
+            steepest, absolute(e.gradient[k][0]) + absolute(e.gradient[k][1]) + absolute(e.gradient[k][2]));
     for (int a = 0; a < 3; ++a) {
         const Quad extent = e.high[a] - e.low[a];
         boxVolume *= extent;
@@ -122,73 +129,102 @@ void setUp(const ScanInput& input, std::int32_t element, ExactElement<mpq_class>
         for (std::size_t a = 0; a < 3; ++a) e.node[k][a] = index[a] - mpq_class(e.base[a]);
     }
     setUpBox(e);
-    setUpGradients(e);   // the caller made sure that the exact volume isn't zero
+    setUpGradients(e);  // the caller made sure that the exact volume isn't zero
     e.dilation = 0;
 }
 
-// A channel's linear function; `finite` false: every point is covered but not valid.
+// A channel's linear function of (s, t, r).
 template <class Real>
-struct ExactChannel {
-    bool finite;
-    float low, high;
-    Real f0, difference[3];
-
-    ExactChannel(const ScanChannel& source, const std::array<std::int32_t, 4>& tet, std::int32_t element) : finite(true) {
-        low = std::numeric_limits<float>::infinity();
-        high = -low;
+class ExactChannel {
+  public:
+    ExactChannel(const ScanChannel& source, const std::array<std::int32_t, 4>& tet, std::int32_t element,
+                 const ExactElement<Real>& e, int s, int t, int r) {
+        low_ = std::numeric_limits<float>::infinity();
+        high_ = -low_;
         double values[4];
         for (std::size_t k = 0; k < 4; ++k) {
             values[k] = source.at(source.cell ? element : tet[k]);
             const float rounded = float(values[k]);
-            finite = finite && std::isfinite(rounded);
-            low = std::min(low, rounded);
-            high = std::max(high, rounded);
+            finite_ = finite_ && std::isfinite(rounded);
+            low_ = std::min(low_, rounded);
+            high_ = std::max(high_, rounded);
         }
-        if (!finite) return;
-        f0 = values[0];
-        for (int k = 0; k < 3; ++k) difference[k] = Real(values[k + 1]) - Real(values[0]);
+        if (!finite_) return;
+        const int axes[3] = {s, t, r};
+        constant_ = values[0];
+        for (int a = 0; a < 3; ++a) slope_[a] = 0;
+        for (int k = 1; k < 4; ++k) {
+            const Real difference = Real(values[k]) - Real(values[0]);
+            constant_ += difference * e.constant[k];
+            for (int a = 0; a < 3; ++a) slope_[a] += difference * e.gradient[k][axes[a]];
+        }
+        step_ = toDouble(slope_[0]);
     }
 
-    float at(const Real (&barycentric)[4]) const {
-        if (!finite) return std::numeric_limits<float>::quiet_NaN();
-        const double value = toDouble(Real(f0 + difference[0] * barycentric[1] + difference[1] * barycentric[2] +
-                                           difference[2] * barycentric[3]));
-        return std::clamp(float(std::clamp(value, double(low), double(high))), low, high);
+    // The value at the first voxel of a run; those of the others follow by a constant step, counted from it.
+    double first(double s, double t, double r) const {
+        if (!finite_) return 0;
+        return toDouble(Real(constant_ + slope_[0] * Real(s) + slope_[1] * Real(t) + slope_[2] * Real(r)));
     }
+    float at(double first, double steps) const {
+        if (!finite_) return std::numeric_limits<float>::quiet_NaN();
+        // A run of one voxel may stand on a slope that overflows.
+        const double value = steps == 0 ? first : first + steps * step_;
+        return std::clamp(float(std::clamp(value, double(low_), double(high_))), low_, high_);
+    }
+
+  private:
+    bool finite_ = true;
+    float low_, high_;
+    Real constant_, slope_[3];
+    double step_ = 0;
 };
 
-// Rejects most scanlines of a thin element in double precision: those that surely pass between two lattice points.
+// Decides most scanlines of a thin element in double precision: all but those with an end too close to a
+// lattice point.
 class RoughScanlines {
   public:
     template <class Real>
     RoughScanlines(const ExactElement<Real>& e, int s, int t, int r) {
-        low_ = toDouble(e.low[s]);
-        high_ = toDouble(e.high[s]);
+        const double slack = e.dilation == 0 ? 0.0 : kBoxSlack;
+        low_ = toDouble(Real(e.low[s] - Real(slack)));
+        high_ = toDouble(Real(e.high[s] + Real(slack)));
         for (int k = 0; k < 4; ++k) {
             const double slope = toDouble(e.gradient[k][s]);
-            // A face along the scanline, or one whose solution would overflow, rejects nothing here.
             const double a = toDouble(Real(-(e.dilation + e.constant[k]))) / slope;
             const double b = -toDouble(e.gradient[k][t]) / slope, c = -toDouble(e.gradient[k][r]) / slope;
-            if (!(std::fabs(a) + std::fabs(b) + std::fabs(c) < 1e200)) continue;
-            plane_[count_++] = {a, b, c, slope > 0};
+            // A face along the scanline, or one whose solution would overflow, decides nothing here.
+            if (std::fabs(a) + std::fabs(b) + std::fabs(c) < 1e200)
+                plane_[count_++] = {a, b, c, slope > 0};
+            else
+                complete_ = false;
         }
     }
-    bool mayHoldPoint(double t, double r) const {
-        double low = low_, high = high_;
+
+    /// True when the answer is certain: the voxels from begin to end, none when begin > end.
+    bool ends(double t, double r, double& begin, double& end) const {
+        double low[2] = {low_ - kUnit * std::fabs(low_), low_ + kUnit * std::fabs(low_)};
+        double high[2] = {high_ - kUnit * std::fabs(high_), high_ + kUnit * std::fabs(high_)};
         for (int i = 0; i < count_; ++i) {
             const Plane& p = plane_[i];
             const double bound = (p.a + p.b * t) + p.c * r;
-            const double error = 0x1p-48 * (std::fabs(p.a) + std::fabs(p.b * t) + std::fabs(p.c * r));
-            if (p.lower)
-                low = std::max(low, bound - error);
-            else
-                high = std::min(high, bound + error);
+            const double error = kUnit * (std::fabs(p.a) + std::fabs(p.b * t) + std::fabs(p.c * r));
+            if (p.lower) {
+                low[0] = std::max(low[0], bound - error);
+                low[1] = std::max(low[1], bound + error);
+            } else {
+                high[0] = std::min(high[0], bound - error);
+                high[1] = std::min(high[1], bound + error);
+            }
         }
-        const double slack = 2 * kBoxSlack + 0x1p-48 * (std::fabs(low) + std::fabs(high));
-        return std::ceil(low - slack) <= std::floor(high + slack);
+        begin = std::ceil(low[0]);
+        end = std::floor(high[1]);
+        if (begin > end) return true;
+        return complete_ && begin == std::ceil(low[1]) && end == std::floor(high[0]);
     }
 
   private:
+    static constexpr double kUnit = 0x1p-48;  // above the rounding of a, b, c and of the sum
     struct Plane {
         double a, b, c;
         bool lower;
@@ -196,14 +232,18 @@ class RoughScanlines {
     double low_, high_;
     Plane plane_[4];
     int count_ = 0;
+    bool complete_ = true;
 };
 
 // Ends of the scanline at (t, r) along axis `s`, relative to the first voxel.
 template <class Real>
-bool scanlineEnds(const ExactElement<Real>& e, int s, int t, int r, double atT, double atR, double& begin, double& end) {
-    Real low = e.low[s] - Real(e.dilation == 0 ? 0.0 : kBoxSlack), high = e.high[s] + Real(e.dilation == 0 ? 0.0 : kBoxSlack);
+bool scanlineEnds(const ExactElement<Real>& e, int s, int t, int r, double atT, double atR, double& begin,
+                  double& end) {
+    Real low = e.low[s] - Real(e.dilation == 0 ? 0.0 : kBoxSlack),
+         high = e.high[s] + Real(e.dilation == 0 ? 0.0 : kBoxSlack);
     for (int k = 0; k < 4; ++k) {
-        const Real rest = e.dilation + e.constant[k] + e.gradient[k][t] * Real(atT) + e.gradient[k][r] * Real(atR);
+        const Real rest =
+            e.dilation + e.constant[k] + e.gradient[k][t] * Real(atT) + e.gradient[k][r] * Real(atR);
         const Real& slope = e.gradient[k][s];
         if (slope == 0) {
             if (rest < 0) return false;
@@ -222,7 +262,8 @@ bool scanlineEnds(const ExactElement<Real>& e, int s, int t, int r, double atT, 
 }
 
 template <class Real>
-void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ExactElement<Real>& e, ScanCounts& counts) {
+void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element, const ExactElement<Real>& e,
+          ScanCounts& counts) {
     // The longest axis is scanned: here a scanline's ends cost far more than its voxels.
     int s = 0;
     for (int a = 1; a < 3; ++a)
@@ -237,17 +278,22 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
     }
     const auto& tet = input.mesh.tets[std::size_t(element)];
     std::vector<ExactChannel<Real>> channels;
-    for (const ScanChannel& source : input.channels) channels.emplace_back(source, tet, element);
+    for (const ScanChannel& source : input.channels) channels.emplace_back(source, tet, element, e, s, t, r);
+    std::vector<double> first(channels.size());
     std::optional<ElementDepth> depth;
     const RoughScanlines rough(e, s, t, r);
 
     for (double atR = from[r]; atR <= to[r]; ++atR) {
         for (double atT = from[t]; atT <= to[t]; ++atT) {
             ++counts.scanlines;
-            if (!rough.mayHoldPoint(atT, atR)) continue;
             double begin = 0, end = 0;
-            if (!scanlineEnds(e, s, t, r, atT, atR, begin, end)) continue;
-            for (double atS = std::max(begin, from[s]); atS <= std::min(end, to[s]); ++atS) {
+            if (!rough.ends(atT, atR, begin, end) && !scanlineEnds(e, s, t, r, atT, atR, begin, end))
+                continue;
+            const double last = std::min(end, to[s]);
+            double atS = std::max(begin, from[s]);
+            if (atS > last) continue;
+            for (std::size_t c = 0; c < channels.size(); ++c) first[c] = channels[c].first(begin, atT, atR);
+            for (; atS <= last; ++atS) {
                 Vec3i point;
                 point[s] = int(std::int64_t(e.base[s]) + std::int64_t(atS));
                 point[t] = int(std::int64_t(e.base[t]) + std::int64_t(atT));
@@ -260,11 +306,8 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
                     if (!depth) depth.emplace(input.mesh, input.frame, element);
                     if (!contestPoint(input, output, element, depth->rank(point), offset)) continue;
                 }
-                Real barycentric[4];
-                for (int k = 0; k < 4; ++k)
-                    barycentric[k] = e.constant[k] + e.gradient[k][s] * Real(atS) + e.gradient[k][t] * Real(atT) +
-                                     e.gradient[k][r] * Real(atR);
-                for (std::size_t c = 0; c < channels.size(); ++c) output.values[c][offset] = channels[c].at(barycentric);
+                for (std::size_t c = 0; c < channels.size(); ++c)
+                    output.values[c][offset] = channels[c].at(first[c], atS - begin);
             }
         }
     }
@@ -274,20 +317,23 @@ void firstVoxel(const ScanInput& input, std::int32_t element, double (&base)[3])
     const auto& tet = input.mesh.tets[std::size_t(element)];
     for (int a = 0; a < 3; ++a) {
         base[a] = input.frame.nodes[std::size_t(tet[0])].whole[a];
-        for (std::size_t k = 1; k < 4; ++k) base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
+        for (std::size_t k = 1; k < 4; ++k)
+            base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
     }
 }
 
 bool hasRepeatedNode(const TetMesh& mesh, const std::array<std::int32_t, 4>& tet) {
     for (std::size_t i = 0; i < 4; ++i)
         for (std::size_t j = i + 1; j < 4; ++j)
-            if (tet[i] == tet[j] || mesh.points[std::size_t(tet[i])] == mesh.points[std::size_t(tet[j])]) return true;
+            if (tet[i] == tet[j] || mesh.points[std::size_t(tet[i])] == mesh.points[std::size_t(tet[j])])
+                return true;
     return false;
 }
 
 }  // namespace
 
-void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts) {
+void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element,
+                        ScanCounts& counts) {
     const TetMesh& mesh = input.mesh;
     const auto& tet = mesh.tets[std::size_t(element)];
     if (hasRepeatedNode(mesh, tet)) return;
@@ -312,7 +358,8 @@ struct ExactScanlines::Impl {
     std::optional<ExactElement<mpq_class>> exact;
 };
 
-ExactScanlines::ExactScanlines(const ScanInput& input, std::int32_t element, int axis) : impl_(std::make_unique<Impl>()) {
+ExactScanlines::ExactScanlines(const ScanInput& input, std::int32_t element, int axis)
+    : impl_(std::make_unique<Impl>()) {
     impl_->axis = axis;
     impl_->quad.emplace();
     firstVoxel(input, element, impl_->quad->base);
@@ -335,7 +382,8 @@ void ExactScanlines::ends(double atT, double atR, double& begin, double& end) co
     }
 }
 
-bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank, std::int64_t offset) {
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank,
+                  std::int64_t offset) {
     std::int32_t& owner = output.owner[offset];
     const std::int32_t present = owner & kElementMask;
     if (!(owner & kRankKnown)) {

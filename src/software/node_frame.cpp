@@ -6,8 +6,9 @@ namespace tessera {
 
 namespace {
 
-// x = o + (whole + part) h along one axis. The difference x - o is split without error into t + tail, and the fused multiply-add (a
-// correctly rounded operation, so the same on every processor) gives the remainder after whole spacings.
+// x = o + (whole + part) h along one axis. The difference x - o is split without error into t + tail, and the
+// fused multiply-add (a correctly rounded operation, so the same on every processor) gives the remainder
+// after whole spacings.
 void splitAxis(double x, double o, double h, double& whole, double& part) {
     const double t = x - o;
     const double back = t - x;
@@ -18,7 +19,8 @@ void splitAxis(double x, double o, double h, double& whole, double& part) {
 
 template <class Real>
 std::array<Real, 3> cross(const std::array<Real, 3>& a, const std::array<Real, 3>& b) {
-    return {Real(a[1] * b[2] - a[2] * b[1]), Real(a[2] * b[0] - a[0] * b[2]), Real(a[0] * b[1] - a[1] * b[0])};
+    return {Real(a[1] * b[2] - a[2] * b[1]), Real(a[2] * b[0] - a[0] * b[2]),
+            Real(a[0] * b[1] - a[1] * b[0])};
 }
 
 template <class Real>
@@ -35,7 +37,8 @@ template <class Real>
 std::array<Real, 3> indexFromWorld(const Lattice& lattice, const Vec3d& pointWorld) {
     const auto x = convert<Real>(pointWorld), o = convert<Real>(lattice.originWorld);
     const std::array<Real, 3> t{Real(x[0] - o[0]), Real(x[1] - o[1]), Real(x[2] - o[2])};
-    const auto u = convert<Real>(lattice.uWorld), v = convert<Real>(lattice.vWorld), w = convert<Real>(lattice.wWorld);
+    const auto u = convert<Real>(lattice.uWorld), v = convert<Real>(lattice.vWorld),
+               w = convert<Real>(lattice.wWorld);
     if (lattice.isAxisParallel()) return {Real(t[0] / u[0]), Real(t[1] / v[1]), Real(t[2] / w[2])};
     const auto vw = cross(v, w), wu = cross(w, u), uv = cross(u, v);
     const Real det = dot(u, vw);
@@ -80,8 +83,8 @@ NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Executio
                     node.part[a] = double(index[a] - whole);
                 }
             }
-            for (std::size_t a = 0; a < 3; ++a) frame.rough[std::size_t(n)][a] = float(node.whole[a] + node.part[a]);
-            frame.rough[std::size_t(n)][3] = 0.0f;
+            for (int a = 0; a < 3; ++a)
+                frame.rough[std::size_t(n)].index[a] = float(node.whole[a] + node.part[a]);
         }
     });
     return frame;

@@ -16,16 +16,20 @@ __extension__ typedef __float128 Quad;
 
 /// The nodes of a mesh in the index space of a lattice.
 ///
-/// Coordinates are kept as whole + part, part in about [0, 1): positions relative to an element's own first voxel then come out with
-/// an error of a few 2^-53 of the element's size in voxels, however far from the origin the element lies.
+/// Coordinates are kept as whole + part, part in about [0, 1): positions relative to an element's own first
+/// voxel then come out with an error of a few 2^-53 of the element's size in voxels, however far from the
+/// origin the element lies.
 struct NodeFrame {
-    struct Node {
+    struct alignas(64) Node {  // a cache line each: elements reach for them in no order
         double whole[3];
-        double part[3];   ///< absolute error at most 4 * 2^-53
+        double part[3];  ///< absolute error at most 4 * 2^-53
     };
     Lattice lattice;
     std::vector<Node> nodes;
-    std::vector<std::array<float, 4>> rough;   ///< rounded index coordinates, for culling only
+    struct alignas(16) Rough {
+        float index[4];  ///< rounded index coordinates and 0
+    };
+    std::vector<Rough> rough;  ///< for culling only
 };
 
 NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution);

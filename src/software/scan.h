@@ -15,7 +15,7 @@ namespace tessera {
 
 /// One component of one field.
 struct ScanChannel {
-    const double* values;   ///< interleaved
+    const double* values;  ///< interleaved
     int components;
     int component;
     bool cell;
@@ -39,17 +39,18 @@ inline constexpr std::int32_t kNoOwner = -1;
 struct ScanOutput {
     IndexBox region;
     IndexBox blockBox;
-    std::int64_t stride[3];            ///< of x, y and z: 1, nx, nx ny
-    std::span<float* const> values;    ///< one array a channel
-    std::int32_t* owner;               ///< kNoOwner, or the covering element, perhaps with kRankKnown
-    double* rank;                      ///< ElementDepth::rank of the owner, written when a point becomes contested
+    std::int64_t stride[3];          ///< of x, y and z: 1, nx, nx ny
+    std::span<float* const> values;  ///< one array a channel
+    std::int32_t* owner;             ///< kNoOwner, or the covering element, perhaps with kRankKnown
+    double* rank;  ///< ElementDepth::rank of the owner, written when a point becomes contested
 
     std::int64_t offset(const Vec3i& p) const {
         const Vec3i q = p - blockBox.min;
         return q.x * stride[0] + q.y * stride[1] + q.z * stride[2];
     }
     Vec3i pointAt(std::int64_t offset) const {
-        return blockBox.min + Vec3i{int(offset % stride[1]), int(offset % stride[2] / stride[1]), int(offset / stride[2])};
+        return blockBox.min +
+               Vec3i{int(offset % stride[1]), int(offset % stride[2] / stride[1]), int(offset / stride[2])};
     }
 };
 
@@ -59,20 +60,24 @@ struct ScanCounts {
     std::int64_t exactElements = 0;
 };
 
-/// True when `element`, which covers the point with this rank, owns it rather than the present owner. Updates owner and rank, not the values.
-bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank, std::int64_t offset);
+/// True when `element`, which covers the point with this rank, owns it rather than the present owner. Updates
+/// owner and rank, not the values.
+bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank,
+                  std::int64_t offset);
 
 /// Samples one element in 113-bit arithmetic or, where that isn't enough, in rationals.
-void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element, ScanCounts& counts);
+void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element,
+                        ScanCounts& counts);
 
-/// The ends of single scanlines of one element, decided in 113-bit arithmetic or rationals: for those that double precision can't decide.
+/// The ends of single scanlines of one element, decided in 113-bit arithmetic or rationals: for those that
+/// double precision can't decide.
 class ExactScanlines {
   public:
     /// @param axis the axis scanned, 0 to 2.
     ExactScanlines(const ScanInput& input, std::int32_t element, int axis);
     ~ExactScanlines();
-    /// First and last voxel of the scanline relative to the element's first voxel; begin > end when it has none. @param t, r places along the
-    /// other two axes in ascending order, relative to the first voxel.
+    /// First and last voxel of the scanline relative to the element's first voxel; begin > end when it has
+    /// none. @param t, r places along the other two axes in ascending order, relative to the first voxel.
     void ends(double t, double r, double& begin, double& end) const;
 
   private:
@@ -80,7 +85,8 @@ class ExactScanlines {
     std::unique_ptr<Impl> impl_;
 };
 
-using ScanFunction = void (*)(const ScanInput&, const ScanOutput&, std::span<const std::int32_t> elements, ScanCounts&);
+using ScanFunction = void (*)(const ScanInput&, const ScanOutput&, std::span<const std::int32_t> elements,
+                              ScanCounts&);
 
 /// A compiled version of the scan for one instruction set.
 struct ScanTarget {
@@ -90,9 +96,9 @@ struct ScanTarget {
 /// Those that this processor can run, the fastest first. All give the same bits.
 const std::vector<ScanTarget>& scanTargets();
 
-/// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding. T below the first limit keeps a
-/// value within 1/16 ulp; T times the element's size below the second keeps a covered point within 2^-26 voxel of the
-/// element. Derivation in docs/algorithms.md.
+/// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding. T below
+/// the first limit keeps a value within 1/16 ulp; T times the element's size below the second keeps a covered
+/// point within 2^-26 voxel of the element. Derivation in docs/algorithms.md.
 inline constexpr double kLargestSlack = 0x1p-28;
 inline constexpr double kLargestSlackTimesSize = 0x1p-29;
 /// Widening of an element's bounding box, in voxels; above the rounding of node places.

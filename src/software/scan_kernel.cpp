@@ -1,9 +1,10 @@
 // The scanline walk of Weiler and Ertl 2001, section 4, for eight elements and eight scanlines at a time.
 //
-// Each face of an element is solved for the scan axis, s >= A + B t + C r or s <= A + B t + C r, so a scanline's ends are a maximum and a
-// minimum of at most three such planes. Planes are moved outwards by a bound on all rounding, so no point of the element is lost; elements for
-// which that bound would let a point outside be covered go to scanElementExactly. Every operation is a single
-// IEEE operation in a fixed order, so every instruction set gives the same bits.
+// Each face of an element is solved for the scan axis, s >= A + B t + C r or s <= A + B t + C r, so a
+// scanline's ends are a maximum and a minimum of at most three such planes. Planes are moved outwards by a
+// bound on all rounding, so no point of the element is lost; elements for which that bound would let a point
+// outside be covered go to scanElementExactly. Every operation is a single IEEE operation in a fixed order,
+// so every instruction set gives the same bits.
 
 #include <algorithm>
 #include <bit>
@@ -27,33 +28,37 @@ inline constexpr int kBatch = 8;
 /// Runs of at least this many voxels along x are filled a vector at a time.
 inline constexpr int kLongRun = 8;
 inline constexpr double kUnit = 0x1p-53;
-/// An axis other than x is scanned when the element is this many times longer along it: rows along x are contiguous in memory.
+/// An axis other than x is scanned when the element is this many times longer along it: rows along x are
+/// contiguous in memory.
 inline constexpr double kAxisGain = 4.0;
-/// Below this a step from voxel to voxel may be denormal; beyond that many steps a count isn't exact in float.
+/// Below this a step from voxel to voxel may be denormal; beyond that many steps a count isn't exact in
+/// float.
 inline constexpr float kDenormalSteps = 0x1p-96f;
 inline constexpr double kMostFloatSteps = 0x1p22;
 /// A scanline's first or last voxel may lie this far outside the element, in voxels.
 inline constexpr double kEndTolerance = 0x1p-26;
-/// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or everywhere.
+/// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or
+/// everywhere.
 inline constexpr double kParallel = 1e200;
 
 /// How far double precision reaches for an element.
-inline constexpr double kThin = 0;       // values can't be trusted
-inline constexpr double kDoubtful = 1;   // values can, but a scanline whose end comes close to a voxel needs a second look
+inline constexpr double kThin = 0;  // values can't be trusted
+inline constexpr double kDoubtful =
+    1;  // values can, but a scanline whose end comes close to a voxel needs a second look
 inline constexpr double kEasy = 2;
 
 /// Setup of eight elements, lane by lane.
 struct alignas(64) Batch {
-    double whole[4][3][kBatch], part[4][3][kBatch];   // node places
+    double whole[4][3][kBatch], part[4][3][kBatch];  // node places
     double planeA[4][kBatch], planeB[4][kBatch], planeC[4][kBatch];
-    double lower[4][kBatch];                          // 1 when face i bounds s from below
-    double base[3][kBatch];                           // first voxel, x y z
-    double axis[kBatch];                              // scan axis
-    double minS[kBatch], maxS[kBatch];                // widened bounds
-    double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];   // whole numbers
-    double grade[kBatch];                             // kThin, kDoubtful or kEasy
-    double shrink[4][kBatch];                         // added to planeA: the face moved inwards by as much as it was moved outwards
-    double gradient[4][3][kBatch], constant[4][kBatch];   // barycentrics: constant + gradient . (s, t, r)
+    double lower[4][kBatch];                                        // 1 when face i bounds s from below
+    double base[3][kBatch];                                         // first voxel, x y z
+    double axis[kBatch];                                            // scan axis
+    double minS[kBatch], maxS[kBatch];                              // widened bounds
+    double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];  // whole numbers
+    double grade[kBatch];                                           // kThin, kDoubtful or kEasy
+    double shrink[4][kBatch];  // added to planeA: the face moved inwards by as much as it was moved outwards
+    double gradient[4][3][kBatch], constant[4][kBatch];  // barycentrics: constant + gradient . (s, t, r)
 };
 
 /// A channel of eight elements: value = constant + s, t, r times the gradient, limited to [low, high].
@@ -62,16 +67,17 @@ struct alignas(64) BatchChannel {
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
     bool finite[kBatch];
-    bool inDouble[kBatch];   // a run's values don't come out right in float: denormal steps, or too many of them
+    bool inDouble[kBatch];  // a run's values don't come out right in float: denormal steps, or too many of
+                            // them
     // Of the element and group of scanlines at work:
-    alignas(64) double first[kBatch];   // value at the first voxel of each scanline's run
-    float step;                         // difference from voxel to voxel
+    alignas(64) double first[kBatch];  // value at the first voxel of each scanline's run
+    float step;                        // difference from voxel to voxel
 };
 
 /// Rows of a group of eight scanlines for a strip of `count` rows along t: lane -> (t, r) offset.
 struct alignas(64) RowTable {
     double t[kBatch + 1][kBatch], r[kBatch + 1][kBatch];
-    int perVector[kBatch + 1];   // rows along r in one group
+    int perVector[kBatch + 1];  // rows along r in one group
 };
 inline const RowTable& rowTable() {
     static const RowTable table = [] {
@@ -106,11 +112,15 @@ using D = hn::CappedTag<double, kBatch>;
 using V = hn::VFromD<D>;
 using M = decltype(hn::Eq(V(), V()));
 
-HWY_INLINE V abs3(V a, V b, V c) { return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c)); }
+HWY_INLINE V abs3(V a, V b, V c) {
+    return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c));
+}
 HWY_INLINE V dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
     return hn::Add(hn::Add(hn::Mul(a0, b0), hn::Mul(a1, b1)), hn::Mul(a2, b2));
 }
-HWY_INLINE V cross1(V a, V b, V c, V d) { return hn::Sub(hn::Mul(a, b), hn::Mul(c, d)); }
+HWY_INLINE V cross1(V a, V b, V c, V d) {
+    return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
+}
 
 // Planes, bounds and gradients of the lanes from `lane` on.
 void setUpLanes(Batch& batch, std::size_t lane) {
@@ -128,12 +138,14 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     }
 
     // The scan axis, and the element turned so that s is along it: x: (x, y, z), y: (y, x, z), z: (z, x, y).
-    const V extentX = hn::Sub(high[0], low[0]), extentY = hn::Sub(high[1], low[1]), extentZ = hn::Sub(high[2], low[2]);
+    const V extentX = hn::Sub(high[0], low[0]), extentY = hn::Sub(high[1], low[1]),
+            extentZ = hn::Sub(high[2], low[2]);
     const V needed = hn::Mul(hn::Set(d, kAxisGain), hn::Add(extentX, hn::Set(d, 1.0)));
     const auto alongY = hn::And(hn::Gt(extentY, needed), hn::Ge(extentY, extentZ));
     const auto alongZ = hn::And(hn::Gt(extentZ, needed), hn::Gt(extentZ, extentY));
     const auto alongX = hn::Not(hn::Or(alongY, alongZ));
-    hn::Store(hn::IfThenElse(alongZ, hn::Set(d, 2.0), hn::IfThenElseZero(alongY, hn::Set(d, 1.0))), d, &batch.axis[lane]);
+    hn::Store(hn::IfThenElse(alongZ, hn::Set(d, 2.0), hn::IfThenElseZero(alongY, hn::Set(d, 1.0))), d,
+              &batch.axis[lane]);
     const auto turn = [&](V& a, V& b, V& c) {
         const V s = hn::IfThenElse(alongZ, c, hn::IfThenElse(alongY, b, a));
         const V t = hn::IfThenElse(alongX, b, a);
@@ -177,7 +189,8 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     c[0] = hn::Sub(one, hn::Add(hn::Add(c[1], c[2]), c[3]));
 
     // The bound T on the rounding of a barycentric coordinate anywhere in the bounding box.
-    const V size0 = hn::Sub(high[0], low[0]), size1 = hn::Sub(high[1], low[1]), size2 = hn::Sub(high[2], low[2]);
+    const V size0 = hn::Sub(high[0], low[0]), size1 = hn::Sub(high[1], low[1]),
+            size2 = hn::Sub(high[2], low[2]);
     V steepest = hn::Zero(d);
     for (int k = 0; k < 4; ++k) steepest = hn::Max(steepest, abs3(g[k][0], g[k][1], g[k][2]));
     const V boxVolume = hn::Mul(hn::Mul(size0, size1), size2);
@@ -271,15 +284,18 @@ struct Walk {
     std::int32_t element;
     int lane;
     std::int64_t strideS, strideT, strideR;
-    std::int64_t origin;   // offset of the element's first voxel in the block (may lie outside)
+    std::int64_t origin;  // offset of the element's first voxel in the block (may lie outside)
     int axis;
+    bool simple;  // see writeSimpleRun
     std::optional<ElementDepth> depth;
     std::optional<ExactScanlines> exact;
 };
 
-// A group of scanlines: where each one's run starts in the block, how long it is there, and how many of its voxels lie before the region.
+// A group of scanlines: where each one's run starts in the block, how long it is there, and how many of its
+// voxels lie before the region.
 struct alignas(64) Rows {
-    double offset[kBatch], length[kBatch], skipped[kBatch];
+    std::int32_t offset[kBatch], length[kBatch];
+    double skipped[kBatch];
 };
 
 HWY_INLINE float limited(float value, float low, float high) {
@@ -294,8 +310,9 @@ float valueAt(const BatchChannel& channel, int lane, int row, double step) {
     return limited(value, channel.low[lane], channel.high[lane]);
 }
 
-// The element's rank at a point it covers. On a face, where conforming meshes are contested, it is zero, and a look at the
-// barycentrics tells: one that is worth less than 2^-15 voxel, which leaves the errors of both ways of computing it inside the step of 2^-13.
+// The element's rank at a point it covers. On a face, where conforming meshes are contested, it is zero, and
+// a look at the barycentrics tells: one that is worth less than 2^-15 voxel, which leaves the errors of both
+// ways of computing it inside the step of 2^-13.
 double rankOf(Walk& walk, std::int64_t offset) {
     const Batch& batch = walk.scratch.batch;
     const int lane = walk.lane;
@@ -305,7 +322,8 @@ double rankOf(Walk& walk, std::int64_t offset) {
         double local[3];
         for (int i = 0; i < 3; ++i) local[i] = point[axes[i]] - batch.base[axes[i]][lane];
         for (int k = 0; k < 4; ++k) {
-            const double gs = batch.gradient[k][0][lane], gt = batch.gradient[k][1][lane], gr = batch.gradient[k][2][lane];
+            const double gs = batch.gradient[k][0][lane], gt = batch.gradient[k][1][lane],
+                         gr = batch.gradient[k][2][lane];
             const double b = batch.constant[k][lane] + gs * local[0] + gt * local[1] + gr * local[2];
             if (b < 0x1p-15 * std::max({std::fabs(gs), std::fabs(gt), std::fabs(gr)})) return 0.0;
         }
@@ -317,8 +335,8 @@ double rankOf(Walk& walk, std::int64_t offset) {
 // Points of the run that another element covers already: the deeper one owns them.
 HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
     const Scratch& scratch = walk.scratch;
-    std::int64_t offset = std::int64_t(rows.offset[row]);
-    for (int k = 0; k < int(rows.length[row]); ++k, offset += walk.strideS) {
+    std::int64_t offset = rows.offset[row];
+    for (int k = 0; k < rows.length[row]; ++k, offset += walk.strideS) {
         std::int32_t& owner = walk.output.owner[offset];
         if (owner == kNoOwner) {
             owner = walk.element;
@@ -333,14 +351,16 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
     }
 }
 
-// Values of one run of voxels that nothing covered before, counted from the run's own first voxel so that they don't depend on the region.
-HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped, float value, float step, float low,
-                        float high) {
+// Values of one run of voxels that nothing covered before, counted from the run's own first voxel so that
+// they don't depend on the region.
+HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped, float value, float step,
+                        float low, float high) {
     int k = 0;
     if (stride == 1 && length >= kLongRun) {
         const hn::ScalableTag<float> df;
         const int lanes = int(hn::Lanes(df));
-        const auto lowest = hn::Set(df, low), highest = hn::Set(df, high), slope = hn::Set(df, step), first = hn::Set(df, value);
+        const auto lowest = hn::Set(df, low), highest = hn::Set(df, high), slope = hn::Set(df, step),
+                   first = hn::Set(df, value);
         for (; k + lanes <= length; k += lanes) {
             auto v = hn::Add(first, hn::Mul(hn::Iota(df, float(skipped + k)), slope));
             v = hn::IfThenElse(hn::Lt(v, lowest), lowest, v);
@@ -352,8 +372,8 @@ HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped
 }
 
 HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
-    const int length = int(rows.length[row]);
-    const std::int64_t offset = std::int64_t(rows.offset[row]);
+    const int length = rows.length[row];
+    const std::int64_t offset = rows.offset[row];
     std::int32_t* const owner = walk.output.owner + offset;
     const std::int64_t stride = walk.strideS;
     std::int32_t free = kNoOwner;
@@ -371,15 +391,42 @@ HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
             fillRun(out, stride, length, int(rows.skipped[row]), float(channel.first[row]), channel.step,
                     channel.low[walk.lane], channel.high[walk.lane]);
         } else {
-            for (int k = 0; k < length; ++k) out[k * stride] = valueAt(channel, walk.lane, row, rows.skipped[row] + k);
+            for (int k = 0; k < length; ++k)
+                out[k * stride] = valueAt(channel, walk.lane, row, rows.skipped[row] + k);
         }
+    }
+}
+
+// The common case, in one loop: one channel, finite, in float, along x, a short run.
+HWY_INLINE void writeSimpleRun(Walk& walk, const Rows& rows, int row) {
+    const int length = rows.length[row];
+    if (length >= kLongRun) {
+        writeRun(walk, rows, row);
+        return;
+    }
+    std::int32_t* const owner = walk.output.owner + rows.offset[row];
+    std::int32_t free = owner[0];
+    for (int k = 1; k < length; ++k) free &= owner[k];
+    if (free != kNoOwner) {
+        writeContestedRun(walk, rows, row);
+        return;
+    }
+    const BatchChannel& channel = walk.scratch.channels[0];
+    const float value = float(channel.first[row]), step = channel.step;
+    const float low = channel.low[walk.lane], high = channel.high[walk.lane];
+    float* const out = walk.output.values[0] + rows.offset[row];
+    const std::int32_t element = walk.element;
+    int count = int(rows.skipped[row]);
+    for (int k = 0; k < length; ++k, ++count) {
+        owner[k] = element;
+        out[k] = limited(value + float(count) * step, low, high);
     }
 }
 
 // True for scanlines whose ends differ too much when the faces are moved inwards instead of outwards.
 template <int Lower>
-HWY_INLINE M doubtfulEnds(const Batch& batch, int lane, const int (&order)[4], V t, V r, V minS, V maxS, V begin,
-                                      V end) {
+HWY_INLINE M doubtfulEnds(const Batch& batch, int lane, const int (&order)[4], V t, V r, V minS, V maxS,
+                          V begin, V end) {
     const D d;
     V low = minS, high = maxS;
     for (int i = 0; i < 4; ++i) {
@@ -416,10 +463,12 @@ HWY_NOINLINE void decideEnds(Walk& walk, M doubtful, V t, V r, V& begin, V& end)
     end = hn::Load(d, ends);
 }
 
-// Scanlines of one element inside the region; `Lower` of the four faces, those first in `order`, bound s from below.
+// Scanlines of one element inside the region; `Lower` of the four faces, those first in `order`, bound s from
+// below.
 template <int Lower>
 void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const double (&to)[3]) {
     const D d;
+    const hn::Rebind<std::int32_t, D> di;
     const RowTable& table = rowTable();
     const Batch& batch = walk.scratch.batch;
     const int lane = walk.lane;
@@ -459,10 +508,11 @@ void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const 
                 const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
                 const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
                 if (hn::AllFalse(d, inside)) continue;
-                hn::Store(hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
-                                  hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR))),
-                          d, rows.offset + q);
-                hn::Store(hn::Add(hn::Sub(clippedEnd, clippedBegin), hn::Set(d, 1.0)), d, rows.length + q);
+                const V offset = hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
+                                         hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR)));
+                const V length = hn::Add(hn::Sub(clippedEnd, clippedBegin), hn::Set(d, 1.0));
+                hn::Store(hn::DemoteTo(di, offset), di, rows.offset + q);
+                hn::Store(hn::DemoteTo(di, length), di, rows.length + q);
                 hn::Store(hn::Sub(clippedBegin, begin), d, rows.skipped + q);
                 std::uint8_t bits[8] = {};
                 hn::StoreMaskBits(d, inside, bits);
@@ -478,17 +528,21 @@ void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const 
             }
             walk.counts.scanlines += count * perVector;
             for (unsigned ahead = hit; ahead; ahead &= ahead - 1)
-                __builtin_prefetch(walk.output.owner + std::int64_t(rows.offset[std::countr_zero(ahead)]), 1);
-            for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
+                __builtin_prefetch(walk.output.owner + rows.offset[std::countr_zero(ahead)], 1);
+            if (walk.simple) {
+                for (; hit; hit &= hit - 1) writeSimpleRun(walk, rows, std::countr_zero(hit));
+            } else {
+                for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
+            }
         }
     }
 }
 
-void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scratch, std::int32_t element, int lane,
-                 ScanCounts& counts) {
+void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scratch, std::int32_t element,
+                 int lane, ScanCounts& counts) {
     const Batch& batch = scratch.batch;
     const int axis = int(batch.axis[lane]);
-    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};   // of s, t and r
+    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
     // The part of the element's rows that lies in the region, relative to its first voxel.
     double from[3], to[3];
     for (int a = 0; a < 3; ++a) {
@@ -511,25 +565,66 @@ void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scra
     constexpr double kLimit = std::numeric_limits<float>::max();
     for (BatchChannel& channel : scratch.channels)
         channel.step = float(std::clamp(channel.gradientS[lane], -kLimit, kLimit));
-    Walk walk{input, output, scratch, counts, element, lane, output.stride[axes[0]], output.stride[axes[1]],
-              output.stride[axes[2]], 0, axis, {}, {}};
+    Walk walk{input,
+              output,
+              scratch,
+              counts,
+              element,
+              lane,
+              output.stride[axes[0]],
+              output.stride[axes[1]],
+              output.stride[axes[2]],
+              0,
+              axis,
+              false,
+              {},
+              {}};
+    walk.simple = axis == 0 && scratch.channels.size() == 1 && scratch.channels[0].finite[lane] &&
+                  !scratch.channels[0].inDouble[lane];
     for (int a = 0; a < 3; ++a)
         walk.origin += (std::int64_t(batch.base[a][lane]) - output.blockBox.min[a]) * output.stride[a];
     switch (lower) {
-        case 0: walkRows<0>(walk, order, from, to); break;
-        case 1: walkRows<1>(walk, order, from, to); break;
-        case 2: walkRows<2>(walk, order, from, to); break;
-        case 3: walkRows<3>(walk, order, from, to); break;
-        default: walkRows<4>(walk, order, from, to); break;
+        case 0:
+            walkRows<0>(walk, order, from, to);
+            break;
+        case 1:
+            walkRows<1>(walk, order, from, to);
+            break;
+        case 2:
+            walkRows<2>(walk, order, from, to);
+            break;
+        case 3:
+            walkRows<3>(walk, order, from, to);
+            break;
+        default:
+            walkRows<4>(walk, order, from, to);
+            break;
     }
 }
 
-void scan(const ScanInput& input, const ScanOutput& output, std::span<const std::int32_t> elements, ScanCounts& counts) {
+// Elements reach for their nodes in no order: fetch those of the next batch while this one is worked, and the
+// elements after that.
+void prefetch(const ScanInput& input, std::span<const std::int32_t> elements, std::size_t begin) {
+    for (std::size_t i = begin; i < std::min(begin + kBatch, elements.size()); ++i) {
+        for (const std::int32_t node : input.mesh.tets[std::size_t(elements[i])]) {
+            __builtin_prefetch(&input.frame.nodes[std::size_t(node)]);
+            for (const ScanChannel& channel : input.channels)
+                if (!channel.cell && channel.component == 0)
+                    __builtin_prefetch(channel.values + std::int64_t(node) * channel.components);
+        }
+    }
+    for (std::size_t i = begin + kBatch; i < std::min(begin + 2 * kBatch, elements.size()); ++i)
+        __builtin_prefetch(&input.mesh.tets[std::size_t(elements[i])]);
+}
+
+void scan(const ScanInput& input, const ScanOutput& output, std::span<const std::int32_t> elements,
+          ScanCounts& counts) {
     static thread_local Scratch scratch;
     scratch.channels.resize(input.channels.size());
     for (std::size_t begin = 0; begin < elements.size(); begin += kBatch) {
         const int count = int(std::min<std::size_t>(kBatch, elements.size() - begin));
         const std::int32_t* batchElements = elements.data() + begin;
+        prefetch(input, elements, begin + kBatch);
         loadBatch(input, batchElements, count, scratch.batch);
         for (std::size_t c = 0; c < input.channels.size(); ++c)
             loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);

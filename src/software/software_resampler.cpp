@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
 
@@ -29,19 +30,24 @@ void checkLattice(const Lattice& lattice, std::span<const IndexBox> boxes) {
             throw InputError("the lattice's origin must be finite and its spacing positive and finite");
     }
     const double volume = glm::dot(lattice.uWorld, glm::cross(lattice.vWorld, lattice.wWorld));
-    const double cube = glm::length(lattice.uWorld) * glm::length(lattice.vWorld) * glm::length(lattice.wWorld);
-    if (!(std::fabs(volume) > 1e-9 * cube)) throw InputError("the lattice's steps u, v and w must not lie in one plane");
-    for (const IndexBox& box : boxes)
+    const double cube =
+        glm::length(lattice.uWorld) * glm::length(lattice.vWorld) * glm::length(lattice.wWorld);
+    if (!(std::fabs(volume) > 1e-9 * cube))
+        throw InputError("the lattice's steps u, v and w must not lie in one plane");
+    for (const IndexBox& box : boxes) {
+        if (box.count() > std::numeric_limits<std::int32_t>::max())
+            throw InputError("a box may hold at most 2^31 - 1 lattice points; sample it in parts");
         for (int a = 0; a < 3; ++a)
             if (box.min[a] < -kIndexLimit || box.max[a] > kIndexLimit || box.min[a] > box.max[a])
                 throw InputError("lattice indices must lie between -2^30 and 2^30; choose a larger spacing");
+    }
 }
 
 // A block being filled, and what decides who owns its points. Kept and used again for the next block.
 struct Work {
     Block block;
     std::vector<std::int32_t> owner;
-    std::unique_ptr<double[]> rank;   // meaningful only where owner has kRankKnown
+    std::unique_ptr<double[]> rank;  // meaningful only where owner has kRankKnown
     std::size_t rankSize = 0;
     std::vector<float*> channelValues;
     std::atomic<int> regionsLeft{0};
@@ -59,7 +65,8 @@ struct Work {
             rankSize = count;
         }
         channelValues.resize(std::size_t(channels));
-        for (std::size_t c = 0; c < channelValues.size(); ++c) channelValues[c] = block.values.data() + c * count;
+        for (std::size_t c = 0; c < channelValues.size(); ++c)
+            channelValues[c] = block.values.data() + c * count;
     }
 };
 
@@ -84,27 +91,31 @@ std::vector<Region> planRegions(std::span<const IndexBox> boxes, int threads) {
     for (int edge = kLargestRegion;; edge /= 2) {
         regions.clear();
         for (std::size_t b = 0; b < boxes.size(); ++b) cutIntoRegions(b, boxes[b], edge, regions);
-        if (edge <= kSmallestRegion || threads == 1 || regions.size() >= std::size_t(kRegionsPerThread * threads)) break;
+        if (edge <= kSmallestRegion || threads == 1 ||
+            regions.size() >= std::size_t(kRegionsPerThread * threads))
+            break;
     }
     return regions;
 }
 
 class BoundSoftware : public BoundResampler {
   public:
-    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const ScanTarget& target) : mesh_(mesh), target_(target) {
+    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const ScanTarget& target)
+        : mesh_(mesh), target_(target) {
         if (mesh.elementCount() > kElementMask) throw InputError("a mesh may have at most 2^30 - 1 elements");
         for (const int f : fields) {
             TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
             const Field& field = mesh.fields[std::size_t(f)];
             for (int c = 0; c < field.components; ++c)
-                channels_.push_back({field.values.data(), field.components, c, field.location == FieldLocation::cell});
+                channels_.push_back(
+                    {field.values.data(), field.components, c, field.location == FieldLocation::cell});
         }
     }
 
     std::string_view target() const override { return target_.name; }
 
-    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes, const BlockSink& sink,
-                                const Execution& execution) override {
+    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                const BlockSink& sink, const Execution& execution) override {
         checkLattice(lattice, boxes);
         Timer timer;
         ResampleStatistics statistics;
@@ -170,8 +181,8 @@ class BoundSoftware : public BoundResampler {
     }
 
   private:
-    // The most expensive regions first, so that no thread is left with one at the end; block by block when that would hold
-    // too many blocks in memory.
+    // The most expensive regions first, so that no thread is left with one at the end; block by block when
+    // that would hold too many blocks in memory.
     std::vector<std::size_t> workOrder(std::span<const IndexBox> boxes, const std::vector<Region>& regions,
                                        const ElementBins& bins) const {
         std::vector<std::size_t> order(regions.size());
@@ -179,13 +190,14 @@ class BoundSoftware : public BoundResampler {
         std::int64_t bytes = 0;
         for (const IndexBox& box : boxes) bytes += box.count() * std::int64_t(4 * channels_.size() + 5);
         if (bytes <= kReorderLimitBytes)
-            std::stable_sort(order.begin(), order.end(),
-                             [&](std::size_t a, std::size_t b) { return bins.of(a).size() > bins.of(b).size(); });
+            std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+                return bins.of(a).size() > bins.of(b).size();
+            });
         return order;
     }
 
-    std::int64_t fillRegion(const NodeFrame& frame, const IndexBox& region, std::span<const std::int32_t> elements,
-                            Work& work, ScanCounts& counts) const {
+    std::int64_t fillRegion(const NodeFrame& frame, const IndexBox& region,
+                            std::span<const std::int32_t> elements, Work& work, ScanCounts& counts) const {
         const Vec3i size = work.block.box.size();
         const ScanInput input{mesh_, frame, channels_};
         const ScanOutput output{region,
@@ -231,15 +243,20 @@ std::vector<std::string> SoftwareResampler::targets() const {
     return names;
 }
 
-double SoftwareResampler::spillBoundVoxels() const { return 0x1p-12; }
-double SoftwareResampler::placeBoundVoxels() const { return 0x1p-24; }
+double SoftwareResampler::spillBoundVoxels() const {
+    return 0x1p-12;
+}
+double SoftwareResampler::placeBoundVoxels() const {
+    return 0x1p-24;
+}
 
 std::unique_ptr<BoundResampler> SoftwareResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                         std::string_view target) const {
     for (const ScanTarget& candidate : scanTargets())
         if (target.empty() || candidate.name == target)
             return std::make_unique<BoundSoftware>(mesh, fields, candidate);
-    throw InputError("the software resampler has no target named " + std::string(target) + " on this processor");
+    throw InputError("the software resampler has no target named " + std::string(target) +
+                     " on this processor");
 }
 
 }  // namespace tessera

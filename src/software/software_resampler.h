@@ -5,8 +5,8 @@
 namespace tessera {
 
 /// The scanline resampler on the processor.
-/// Based on: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive Visualization of
-/// Unstructured Grids, IEEE Visualization 2001, section 4.
+/// Based on: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive Visualization
+/// of Unstructured Grids, IEEE Visualization 2001, section 4.
 class SoftwareResampler : public Resampler {
   public:
     std::string_view name() const override { return "software"; }
