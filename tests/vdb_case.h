@@ -80,7 +80,9 @@ inline std::uint32_t pointKey(int level, const Vec3i& p, int channel) {
 inline bool coveredAt(int level, const Vec3i& p) {
     return pointKey(level, p, 15) % 4 != 0;
 }
-inline bool everywhere(int, const Vec3i&) { return true; }
+inline bool everywhere(int, const Vec3i&) {
+    return true;
+}
 inline float valueAt(int level, const Vec3i& p, int channel) {
     const std::uint32_t key = pointKey(level, p, channel);
     return (key & 1 ? -1.0f : 1.0f) * std::ldexp(1.0f + float(key >> 9) * 0x1p-23f, int(key >> 1 & 31) - 16);

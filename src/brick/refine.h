@@ -29,7 +29,7 @@ struct RefineOptions {
     Criterion criterion = Criterion::elementSize;
     int brickCells = 16;  ///< 8, 16, 32 or 64
     int resolution = 0;   ///< lattice points along the longest axis of the bounds (the finest level); 0: not
-                         ///< given. They run exactly from the bounds' minimum to their maximum
+                          ///< given. They run exactly from the bounds' minimum to their maximum
     double spacingWorld = 0;       ///< finest spacing; 0: not given
     double samplesPerElement = 2;  ///< element-size: lattice points along a typical element edge
     int maxLevels = 0;    ///< number of nested levels at most; 0: 8 for element-size, no bound for error

@@ -16,17 +16,21 @@ enum class FieldLocation { point, cell };
 struct Field {
     std::string name;
     FieldLocation location = FieldLocation::point;
-    int components = 1;           ///< 1 to 9
-    std::vector<double> values;   ///< interleaved: values[item * components + component], item = node or element
+    int components = 1;  ///< 1 to 9
+    std::vector<double>
+        values;  ///< interleaved: values[item * components + component], item = node or element
 
-    double at(std::int64_t item, int component) const { return values[std::size_t(item * components + component)]; }
+    double at(std::int64_t item, int component) const {
+        return values[std::size_t(item * components + component)];
+    }
 };
 
 /// A tetrahedral mesh. Elements may be of either orientation, flat, overlapping or non-conforming.
 struct TetMesh {
-    std::vector<Vec3d> points;                       ///< nodes, world units
-    std::vector<std::array<std::int32_t, 4>> tets;   ///< node indices of every element, each in [0, points.size())
-    std::vector<Field> fields;                       ///< cell fields have one tuple for every element
+    std::vector<Vec3d> points;  ///< nodes, world units
+    std::vector<std::array<std::int32_t, 4>>
+        tets;                   ///< node indices of every element, each in [0, points.size())
+    std::vector<Field> fields;  ///< cell fields have one tuple for every element
 
     std::int64_t nodeCount() const { return std::int64_t(points.size()); }
     std::int64_t elementCount() const { return std::int64_t(tets.size()); }
