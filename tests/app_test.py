@@ -165,7 +165,8 @@ class BadInput(AppTest):
             ["--samples-per-element", "0"], ["--samples-per-element", "-2"], ["--max-levels", "0"], ["--max-levels", "99"],
             ["--brick-size", "7"], ["--brick-size", "128"], ["--max-voxels", "0"], ["--max-voxels", "x"], ["--max-memory", "-1G"],
             ["--max-memory", "1X"], ["--bounds", "0,0,0,1,1"], ["--bounds", "0,0,0,0,1,1"], ["--bounds", "0,0,0,a,1,1"],
-            ["--layout", "round"], ["--extend", "-1"], ["--extend", "1000"], ["--background", "nan"], ["--unit-scale", "-1"],
+            ["--layout", "round"], ["--extend", "-1"], ["--extend", "1000"], ["--background", "nan"], ["--unit-scale", "-1"], ["--unit-scale", "0"], ["--unit-scale", "1e31"],
+            ["--unit-scale", "1e-31"], ["--background", "1e39"], ["--time-step", "-1"],
             ["--up-axis", "x"], ["--threads", "-1"], ["--threads", "many"], ["--field", ""], ["--field", "f,f"], ["--field", "=x"],
             ["--algorithm", "magic"], ["--time-step", "-3"], ["--error-field", "f"], ["--nonsense"],
         ):  # fmt: skip
@@ -202,6 +203,37 @@ class BadInput(AppTest):
     def test_output_may_not_replace_the_input(self):
         self.reject(2, "cube.vtu", "resample", self.cube, "-o", self.cube)
         self.assertIn("VTKFile", self.cube.read_text())
+
+    def test_no_output_may_replace_an_input_or_another_output(self):
+        self.succeed("resample", self.cube, "-o", "good.vdb", "--refine", "uniform", "--resolution", "20", "--quiet")
+        os.symlink("good.vdb", self.folder / "link.vdb")
+        os.symlink("new.vdb", self.folder / "dangling.vdb")
+        files = {name: (self.folder / name).read_bytes() for name in ("cube.vtu", "good.vdb")}
+        for arguments in (
+            ["resample", self.cube, "-o", "out.vdb", "--json", "cube.vtu"],
+            ["resample", self.cube, "-o", "out.vdb", "--json", "./out.vdb"],
+            ["resample", self.cube, "-o", "new.vdb", "--json", "dangling.vdb"],
+            ["resample", self.cube, "--dry-run", "--json", "cube.vtu"],
+            ["resample", self.cube, "-o", "out.vdb", "--like", "good.vdb", "--json", "good.vdb"],
+            ["resample", self.cube, "-o", "link.vdb", "--like", "good.vdb"],
+            ["info", "cube.vtu", "--json", self.cube],
+            ["info", "good.vdb", "--json", "link.vdb"],
+            ["verify", self.cube, "good.vdb", "--json", "good.vdb"],
+            ["verify", self.cube, "good.vdb", "--json", "cube.vtu"],
+            ["tets", self.cube, "-o", "cube.vtu"],
+            ["tets", self.cube, "-o", "tets.vtu", "--json", "tets.vtu"],
+            ["picture", "good.vdb", "-o", "good.vdb"],
+            ["picture", "good.vdb", "-o", "cube.vtu", "--mesh", "cube.vtu"],
+            ["picture", "good.vdb", "-o", "slice.png", "--json", "slice.png"],
+        ):  # fmt: skip
+            with self.subTest(arguments=arguments):
+                self.reject(2, "would replace", *arguments)
+                for name, content in files.items():
+                    self.assertEqual((self.folder / name).read_bytes(), content)
+
+    def test_picture_beside_the_mesh(self):
+        self.succeed("resample", self.cube, "-o", "good.vdb", "--refine", "uniform", "--resolution", "20", "--quiet")
+        self.reject(2, "good.vdb plane nothing", "picture", "good.vdb", "-o", "slice.png", "--at", "5")
 
     def test_damaged_vdb(self):
         self.succeed("resample", self.cube, "-o", "good.vdb", "--refine", "uniform", "--resolution", "20", "--quiet")
@@ -344,6 +376,14 @@ class Reports(AppTest):
     def test_quiet_prints_nothing(self):
         self.assertEqual(self.succeed("resample", self.cube, "-o", "out.vdb", "--quiet"), "")
 
+    def test_an_unmet_bound_is_a_warning(self):
+        arguments = ("resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "error", "--max-error", "0.0001%", "--max-voxels", "200K")
+        for extra in ([], ["--dry-run"]):
+            result = self.run_tessera(*arguments, *extra)
+            self.assertEqual((result.returncode, result.stdout), (0, ""), result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+            self.assertRegex(result.stderr, r"^tessera: warning: .*not within the bound: .")
+
     def test_dry_run_writes_nothing(self):
         before = sorted(os.listdir(self.folder))
         for options in ([], ["--refine", "uniform", "--resolution", "40"], ["--refine", "error", "--max-error", "5%"]):
@@ -391,6 +431,31 @@ class Reports(AppTest):
             self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--threads", threads)
             files.add((self.folder / "out.vdb").read_bytes())
         self.assertEqual(len(files), 1)
+
+    def test_bounds_are_stored_and_verified(self):
+        bounds = [-0.5, -0.5, -0.5, 0.25, 0.5, 0.1]
+        for options in ([], ["--refine", "uniform", "--resolution", "40"], ["--half"]):
+            self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--bounds=" + ",".join(map(str, bounds)), *options)
+            self.assertEqual(self.report("info", "out.vdb")["bounds"], [bounds[:3], bounds[3:]])
+            report = self.report("verify", self.stokes, "out.vdb")
+            self.assertTrue(report["holds"])
+            self.assertGreater(report["coverage"]["outside_bricks"], 0)
+        self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet")
+        self.assertNotIn("bounds", self.report("info", "out.vdb"))
+
+    def test_flat_grid_is_capped_and_says_so(self):
+        dry = self.report("resample", self.stokes, "--layout", "flat", "--dry-run")
+        flat = dry["estimate"]["flat"]
+        self.assertGreater(flat["level"], 0)
+        self.assertLessEqual(flat["voxels"], 2**26)
+        levels = dry["estimate"]["levels"]
+        self.assertAlmostEqual(flat["bytes"] / flat["voxels"], levels["bytes"] / levels["voxels"], places=3)
+        report = self.report("resample", self.stokes, "-o", "out.vdb", "--layout", "flat")
+        self.assertEqual(report["write"]["flat_level"], flat["level"])
+        notes = [note for note in report["write"]["notes"] if "the flat grid has spacing" in note]
+        self.assertEqual(len(notes), 1)
+        self.assertIn("--max-voxels", notes[0])
+        self.assertIn(notes[0], dry["notes"])
 
     def test_like_uses_the_lattice_of_the_other_file(self):
         self.succeed("resample", self.cube, "-o", "a.vdb", "--refine", "uniform", "--spacing", "0.07", "--quiet")

@@ -68,6 +68,45 @@ TEST_F(VdbFileTest, LevelsRoundTripIsBitExact) {
     }
 }
 
+TEST_F(VdbFileTest, BoundsComeBackExactlyAndAreAbsentWithoutOnes) {
+    for (const bool bounded : {false, true}) {
+        BrickResult result = makeResult(Vec3d(0), 0.1, 8, nestedLeaves(), 1);
+        VdbWriteOptions options;
+        if (bounded)
+            options.boundsWorld = Box3d{{-1.0 / 3, -2e-300, 0.1}, {1.0 / 7, 1e22, 0.30000000000000004}};
+        writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
+        const VdbFile read = readVdb(file("out.vdb"));
+        ASSERT_EQ(read.boundsWorld.has_value(), bounded);
+        if (!bounded) continue;
+        EXPECT_EQ(read.boundsWorld->min, options.boundsWorld->min);
+        EXPECT_EQ(read.boundsWorld->max, options.boundsWorld->max);
+    }
+}
+
+TEST_F(VdbFileTest, FlatPlanKeepsVoxelsAndBytesWithinTheirBounds) {
+    // 64 bricks of 64^3 points are 2^24.
+    std::vector<BrickKey> leaves;
+    for (int i = 0; i < 64; ++i) leaves.push_back({0, {i & 3, i >> 2 & 3, i >> 4}});
+    const BrickTree tree(Vec3d(0), 0.5, 64, std::move(leaves));
+    VdbWriteOptions options;
+    const auto level = [&](int channels) {
+        const FlatGridPlan plan = planFlatGrid(tree, channels, options);
+        EXPECT_EQ(plan.points, std::int64_t(1) << (24 - 3 * plan.level));
+        EXPECT_EQ(plan.bytes, plan.points * 4 * channels + plan.points / 8);
+        EXPECT_EQ(plan.note.empty(), plan.level == 0);
+        return plan.level;
+    };
+    options.maxFlatBytes = std::int64_t(1) << 27;
+    EXPECT_EQ(level(1), 0);
+    EXPECT_EQ(level(8), 1) << "channels cost memory";
+    EXPECT_NE(planFlatGrid(tree, 8, options).note.find("--max-memory"), std::string::npos);
+    options.maxFlatVoxels = (std::int64_t(1) << 21) - 1;
+    EXPECT_EQ(level(1), 2);
+    const std::string note = planFlatGrid(tree, 1, options).note;
+    EXPECT_NE(note.find("spacing 2 (level 2) instead of 0.5"), std::string::npos) << note;
+    EXPECT_NE(note.find("--max-voxels"), std::string::npos) << note;
+}
+
 TEST_F(VdbFileTest, ReportComesBackExactly) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {{0, {0, 0, 0}}}, 1);
     result.report = sampleReport();

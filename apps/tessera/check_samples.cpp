@@ -115,11 +115,11 @@ class Checker {
                tile->covered((p.x % kTileSize * kTileSize + p.y % kTileSize) * kTileSize + p.z % kTileSize);
     }
 
-    /// A value that isn't finite is right where an element there depends on one.
+    /// A value that isn't finite is right where an element there depends on one that isn't finite as a float.
     bool mayBeInvalid(const Field& field) const {
         const auto finite = [&](std::int64_t item) {
             for (int c = 0; c < field.components; ++c)
-                if (!std::isfinite(field.at(item, c))) return false;
+                if (!std::isfinite(float(field.at(item, c)))) return false;
             return true;
         };
         return std::any_of(places_.begin(), places_.end(), [&](const auto& found) {
@@ -138,9 +138,9 @@ class Checker {
     void findPlaces(const Vec3d& world, double spacing) {
         // World coordinates of lattice points are rounded; on a mesh far from the origin that can exceed the
         // bound itself.
-        const double rounding = 4 * std::numeric_limits<double>::epsilon() *
-                                std::max({std::abs(world.x), std::abs(world.y), std::abs(world.z)});
-        const double slack = resampler_.spillBoundVoxels() * spacing + rounding;
+        rounding_ = 4 * std::numeric_limits<double>::epsilon() *
+                    std::max({std::abs(world.x), std::abs(world.y), std::abs(world.z)});
+        const double slack = resampler_.spillBoundVoxels() * spacing + rounding_;
         Box3d box{world - Vec3d(slack), world + Vec3d(slack)};
         candidates_.clear();
         places_.clear();
@@ -169,8 +169,9 @@ class Checker {
                 }
                 double best = std::numeric_limits<double>::infinity();
                 for (const auto& [element, place] : places_)
-                    best = std::min(best, excess(mesh_, field, c, element, place, stored,
-                                                 resampler_.placeBoundVoxels() * spacing, halfFloat_));
+                    best = std::min(best,
+                                    excess(mesh_, field, c, element, place, stored,
+                                           resampler_.placeBoundVoxels() * spacing + rounding_, halfFloat_));
                 if (best <= 0) continue;
                 result.largestExcess = std::max(result.largestExcess, best);
                 note(result, result.wrongValues,
@@ -185,6 +186,7 @@ class Checker {
     const VdbFile& file_;
     const Resampler& resampler_;
     bool halfFloat_;
+    double rounding_ = 0;  // of the world place at work
     ElementIndex index_;
     std::vector<std::int32_t> candidates_;
     std::vector<std::pair<std::int32_t, Place>> places_;

@@ -6,6 +6,7 @@
 #include "commands.h"
 #include "io/read_mesh.h"
 #include "io/vdb_file.h"
+#include "output_paths.h"
 #include "report_text.h"
 
 namespace tessera {
@@ -43,6 +44,11 @@ int showVdb(const InfoArguments& arguments, Session& session) {
         arguments.path, file.version, file.layout == VdbLayout::flat ? "flat" : "levels", file.sourceFile,
         file.algorithm, file.criterion, origin.x, origin.y, origin.z, file.tree.spacingWorld(),
         file.tree.brickCells(), file.unitScale);
+    if (file.boundsWorld) {
+        const Box3d& b = *file.boundsWorld;
+        text += fmt::format("  bounds ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})\n", b.min.x,
+                            b.min.y, b.min.z, b.max.x, b.max.y, b.max.z);
+    }
     session.print(text + formatTable(rows) + levelsText(levels) + errorText(file.report));
     if (arguments.common.jsonPath.empty()) return 0;
     Json json = documentHead(arguments.path);
@@ -51,6 +57,8 @@ int showVdb(const InfoArguments& arguments, Session& session) {
     json["criterion"] = file.criterion;
     json["layout"] = file.layout == VdbLayout::flat ? "flat" : "levels";
     json["unit_scale"] = file.unitScale;
+    if (const auto& b = file.boundsWorld)
+        json["bounds"] = {{b->min.x, b->min.y, b->min.z}, {b->max.x, b->max.y, b->max.z}};
     json["grids"] = gridsJson(file);
     json.update(levelsJson(file.tree, levels));
     json["coverage"] = coverageJson(file.report);
@@ -86,6 +94,7 @@ void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
 }
 
 int runInfo(const InfoArguments& arguments) {
+    checkOutputPaths({arguments.path}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     const bool isVdb = std::filesystem::path(arguments.path).extension() == ".vdb";
     return isVdb ? showVdb(arguments, session) : showMesh(arguments, session);

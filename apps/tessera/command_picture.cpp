@@ -12,6 +12,7 @@
 #include "io/image.h"
 #include "io/read_mesh.h"
 #include "io/vdb_file.h"
+#include "output_paths.h"
 #include "report_text.h"
 
 namespace tessera {
@@ -42,12 +43,14 @@ Box3d coveredBounds(const VdbFile& file) {
 }
 
 const OutputField& chooseField(const VdbFile& file, const std::string& name) {
+    if (file.fields.empty())
+        throw InputError("the file holds no field, only which voxels lie in the mesh: nothing to draw");
     std::string there;
     for (const OutputField& field : file.fields) {
         if (field.name == name || (name.empty() && &field == &file.fields.front())) return field;
         there += (there.empty() ? "" : ", ") + field.name;
     }
-    throw InputError(fmt::format("no field named '{}'; there are: {}", name, there.empty() ? "none" : there));
+    throw InputError(fmt::format("no field named '{}'; there are: {}", name, there));
 }
 
 /// What a cell that is partly outside the mesh is filled from: the mesh itself, or, without it, fields
@@ -124,6 +127,16 @@ SliceOptions sliceOptions(const PictureArguments& arguments, const VdbFile& file
     return slice;
 }
 
+ValueRange shownRange(const ScalarImage& image) {
+    ValueRange range;
+    for (std::size_t i = 0; i < image.values.size(); ++i)
+        if (image.coverage[i] && std::isfinite(image.values[i])) {
+            range.min = std::min(range.min, double(image.values[i]));
+            range.max = std::max(range.max, double(image.values[i]));
+        }
+    return range;
+}
+
 }  // namespace
 
 void addPictureOptions(CLI::App& command, PictureArguments& a) {
@@ -153,6 +166,8 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
 }
 
 int runPicture(const PictureArguments& arguments) {
+    checkOutputPaths({arguments.input, arguments.mesh},
+                     {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     checkWritable(arguments.output);
     const VdbFile file = readVdb(arguments.input);
@@ -165,12 +180,11 @@ int runPicture(const PictureArguments& arguments) {
     const Reconstruction reconstruction(outside.mesh, outside.fields, file.tree, file.store, nearest);
     const ScalarImage image = sampleField(file, field, arguments, reconstruction, slice, session.execution);
 
-    ValueRange range;
-    for (std::size_t i = 0; i < image.values.size(); ++i)
-        if (image.coverage[i] && std::isfinite(image.values[i])) {
-            range.min = std::min(range.min, double(image.values[i]));
-            range.max = std::max(range.max, double(image.values[i]));
-        }
+    const ValueRange range = shownRange(image);
+    if (range.empty())
+        throw InputError(
+            fmt::format("{}: the plane {} = {:.9g} meets no voxel with a finite value of {}: nothing to draw",
+                        arguments.input, arguments.axis, slice.positionWorld, field.name));
     PictureOptions options;
     options.title = fmt::format("{}  {} = {:.4g}", field.name, arguments.axis, slice.positionWorld);
     if (!arguments.range.empty()) {

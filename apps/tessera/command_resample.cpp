@@ -10,6 +10,7 @@
 #include "field_selection.h"
 #include "io/atomic_file.h"
 #include "io/read_mesh.h"
+#include "output_paths.h"
 #include "predict_cost.h"
 #include "registry/registry.h"
 #include "report_text.h"
@@ -43,16 +44,18 @@ std::vector<Step> listSteps(const ResampleArguments& arguments) {
 }
 
 void checkOutputs(const std::vector<Step>& steps, const ResampleArguments& arguments) {
-    namespace fs = std::filesystem;
     const std::string& json = arguments.common.jsonPath;
+    std::vector<std::string> inputs{arguments.input, arguments.like};
+    std::vector<OutputPath> outputs;
+    for (const Step& step : steps) {
+        inputs.push_back(step.input);
+        if (!arguments.dryRun) outputs.push_back({"--output", step.output});
+    }
+    outputs.push_back({"--json", json});
+    checkOutputPaths(inputs, outputs);
     if (!json.empty() && json != "-") checkWritable(json);
     if (arguments.dryRun) return;
-    for (const Step& step : steps) {
-        std::error_code ignored;
-        if (fs::equivalent(step.input, step.output, ignored))
-            throw InputError(fmt::format("{}: the output would replace the input", step.output));
-        checkWritable(step.output);
-    }
+    for (const Step& step : steps) checkWritable(step.output);
 }
 
 /// The run of `tessera resample`: settings, and what the steps of a series share.
@@ -68,11 +71,13 @@ class ResampleRun {
   private:
     MeshFile read(const Step& step);
     RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection) const;
+    VdbWriteOptions writeOptions() const;
     void surveySeries(const std::vector<Step>& steps);
     void surveySpacing(const TetMesh& mesh);
     Json runStep(const Step& step);
-    Json dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
-                StageTimes& times);
+    Json dryRun(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                const RefineOptions& options, StageTimes& times);
+    void warnUnbounded(const Step& step, const BrickResult& result);
     Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
                         const RefineOptions& options, StageTimes& times);
     VdbWriteResult write(const Step& step, const MeshFile& file, const FieldSelection& selection,
@@ -146,6 +151,13 @@ RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection
     return options;
 }
 
+VdbWriteOptions ResampleRun::writeOptions() const {
+    VdbWriteOptions options = settings_.write;
+    options.maxFlatBytes = settings_.refine.maxMemoryBytes;
+    options.boundsWorld = settings_.refine.boundsWorld;
+    return options;
+}
+
 /// One lattice and one value range for all steps need a look at all of them first.
 void ResampleRun::surveySeries(const std::vector<Step>& steps) {
     const bool frameGiven = settings_.refine.frame.has_value();
@@ -199,7 +211,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"criterion", arguments_.refine},
                 {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
-    Json rest = arguments_.dryRun ? dryRun(file, selection, options, times)
+    Json rest = arguments_.dryRun ? dryRun(step, file, selection, options, times)
                                   : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
     report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
@@ -209,8 +221,15 @@ Json ResampleRun::runStep(const Step& step) {
     return report;
 }
 
-Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, const RefineOptions& options,
-                         StageTimes& times) {
+/// A script that looks at the exit code alone would take the file for one within the bound.
+void ResampleRun::warnUnbounded(const Step& step, const BrickResult& result) {
+    if (!result.bounded)
+        session_.warn(
+            fmt::format("{}: the error is not within the bound: {}", step.input, result.stoppedBecause));
+}
+
+Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSelection& selection,
+                         const RefineOptions& options, StageTimes& times) {
     Timer timer;
     BrickTree tree;
     std::vector<std::string> notes;
@@ -218,13 +237,18 @@ Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, 
         // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
         BrickResult result =
             refineAndResample(file.mesh, selection.fields, resampler_, options, session_.execution);
+        warnUnbounded(step, result);
         tree = std::move(result.tree);
         notes = std::move(result.notes);
     } else {
         tree = planBricks(file.mesh, options, session_.execution, selection.channels, &notes);
     }
     times.planMs = timer.elapsedMs();
-    const PlanEstimate estimate = estimatePlan(tree, selection.channels);
+    PlanEstimate estimate = estimatePlan(tree, selection.channels);
+    const FlatGridPlan flat = planFlatGrid(tree, selection.channels, writeOptions());
+    estimate.flatPoints = flat.points;
+    estimate.flatBytes = flat.bytes;
+    if (!flat.note.empty()) notes.push_back(flat.note);
     const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels,
                                             resampler_, session_.execution);
     std::string text = estimateText(estimate, cost.levelsMs, cost.flatMs);
@@ -233,6 +257,7 @@ Json ResampleRun::dryRun(const MeshFile& file, const FieldSelection& selection, 
     Json json = levelsJson(tree, summarizeLevels(tree, {}));
     json["notes"] = notes;
     json["estimate"] = estimateJson(estimate, cost.levelsMs, cost.flatMs);
+    json["estimate"]["flat"]["level"] = flat.level;
     return json;
 }
 
@@ -243,13 +268,14 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     std::optional<Reconstruction> reconstruction;
     std::optional<ExtensionPoints> extension;
     const bool flat = settings_.write.layout == VdbLayout::flat;
-    if (flat || arguments_.extendLayers > 0) nearest.emplace(file.mesh, session_.execution.threadCount());
+    const int layers = arguments_.extendLayers.value_or(flat ? 1 : 0);
+    if (flat || layers > 0) nearest.emplace(file.mesh, session_.execution.threadCount());
     if (flat) reconstruction.emplace(file.mesh, selection.fields, result.tree, result.store, *nearest);
-    if (arguments_.extendLayers > 0)
-        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest,
-                                  arguments_.extendLayers, session_.execution);
+    if (layers > 0)
+        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest, layers,
+                                  session_.execution);
     times.extendMs = timer.restart();
-    VdbWriteOptions options = settings_.write;
+    VdbWriteOptions options = writeOptions();
     options.sourceFile = std::filesystem::path(step.input).filename().string();
     VdbWriteResult written =
         writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
@@ -272,6 +298,7 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     const std::int64_t sampleBytes = result.store.memoryBytes();
     const VdbWriteResult written = write(step, file, selection, result, times);
     printResult(step, result, levels, written, times);
+    if (options.criterion == Criterion::error) warnUnbounded(step, result);
 
     Json json = levelsJson(result.tree, levels);
     json["coverage"] = coverageJson(result.report);

@@ -4,6 +4,7 @@
 #include "commands.h"
 #include "io/atomic_file.h"
 #include "io/read_mesh.h"
+#include "output_paths.h"
 #include "report_text.h"
 
 namespace tessera {
@@ -18,6 +19,8 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
 }
 
 int runTets(const TetsArguments& arguments) {
+    checkOutputPaths({arguments.input},
+                     {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     checkWritable(arguments.output);
     Timer timer;

@@ -154,8 +154,10 @@ int runVerify(const VerifyArguments& arguments) {
     times.readMs = timer.restart();
     const std::vector<int> fields = matchFields(mesh, file, arguments.meshPath);
     const NearestPointIndex nearest(mesh, session.execution.threadCount());
+    MeasureOptions measure;
+    measure.boundsWorld = file.boundsWorld;
     const ErrorReport measured =
-        measureError(mesh, fields, file.tree, file.store, nearest, session.execution);
+        measureError(mesh, fields, file.tree, file.store, nearest, session.execution, measure);
     const std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
     const SampleCheck samples = checkSamples(mesh, fields, file, findResampler(file.algorithm),
                                              file.halfFloat, arguments.samples, session.execution);

@@ -17,6 +17,9 @@ class Session {
     /// Prints to standard output, unless quiet or the JSON report goes there.
     void print(const std::string& text);
 
+    /// Prints one line to standard error, quiet or not.
+    void warn(const std::string& text);
+
   private:
     bool prints_;
 };

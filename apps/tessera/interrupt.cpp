@@ -30,6 +30,10 @@ void installInterruptHandlers() {
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);
+    // Whoever started the program with nohup wants it to outlive the terminal.
+    struct sigaction before {};
+    sigaction(SIGHUP, nullptr, &before);
+    if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
     // A file size limit and a closed pipe are reported by write(); the default action would kill the process
     // before it cleans up.
     signal(SIGXFSZ, SIG_IGN);

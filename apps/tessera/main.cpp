@@ -3,11 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
+#include <limits>
 #include <new>
 
 #include "base/error.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "output_paths.h"
 
 namespace {
 
@@ -52,12 +54,19 @@ void describe(CLI::App& app, Arguments& arguments) {
                             arguments.tets);
     tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
                                arguments.picture);
+    for (CLI::App* command : app.get_subcommands({}))
+        if (CLI::Option* step = command->get_option_no_throw("--time-step"))
+            step->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
 int run(const CLI::App& app, const Arguments& arguments) {
     if (app.got_subcommand("resample")) return tessera::runResample(arguments.resample);
     if (app.got_subcommand("info")) return tessera::runInfo(arguments.info);
-    if (app.got_subcommand("verify")) return tessera::runVerify(arguments.verify);
+    if (app.got_subcommand("verify")) {
+        const tessera::VerifyArguments& verify = arguments.verify;
+        tessera::checkOutputPaths({verify.meshPath, verify.vdbPath}, {{"--json", verify.common.jsonPath}});
+        return tessera::runVerify(verify);
+    }
     if (app.got_subcommand("tets")) return tessera::runTets(arguments.tets);
     return tessera::runPicture(arguments.picture);
 }

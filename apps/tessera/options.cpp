@@ -6,6 +6,7 @@
 #include <CLI/Formatter.hpp>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "base/error.h"
@@ -17,6 +18,8 @@ namespace {
 constexpr int kLargestExtend = 64;
 constexpr int kLargestLevels = 24;
 constexpr int kLargestResolution = 1 << 20;
+constexpr double kLargestHalf = 65504;
+constexpr double kSmallestUnitScale = 1e-30, kLargestUnitScale = 1e30;
 
 double parseNumber(const std::string& option, const std::string& text) {
     double value = 0;
@@ -112,8 +115,10 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
     command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
     command
         .add_option("--extend", a.extendLayers,
-                    "layers of voxels written outside the mesh, with the value at the nearest mesh point")
-        ->capture_default_str()
+                    "layers of voxels written outside the mesh, with the value at the nearest mesh point "
+                    "(default: 1 for "
+                    "the flat layout, which Blender and Houdini interpolate without looking at the mesh; 0 "
+                    "for levels)")
         ->group(group);
     command.add_option("--background", a.background, "value of voxels that are not stored")
         ->capture_default_str()
@@ -149,13 +154,17 @@ void checkRanges(const ResampleArguments& a) {
                 fmt::format("--max-levels: expected 1 to {}, got {}", kLargestLevels, *a.maxLevels));
     require(a.brickSize == 8 || a.brickSize == 16 || a.brickSize == 32 || a.brickSize == 64,
             fmt::format("--brick-size: expected 8, 16, 32 or 64, got {}", a.brickSize));
-    require(a.extendLayers >= 0 && a.extendLayers <= kLargestExtend,
-            fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, a.extendLayers));
-    require(std::isfinite(a.background),
-            fmt::format("--background: expected a finite number, got {}", a.background));
-    require(a.unitScale == 0 || (std::isfinite(a.unitScale) && a.unitScale > 0),
-            fmt::format("--unit-scale: expected a number above 0, got {}", a.unitScale));
-    require(a.timeStep >= -1, fmt::format("--time-step: expected 0 or more, got {}", a.timeStep));
+    if (a.extendLayers)
+        require(*a.extendLayers >= 0 && *a.extendLayers <= kLargestExtend,
+                fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, *a.extendLayers));
+    const double largest = a.half ? kLargestHalf : double(std::numeric_limits<float>::max());
+    require(std::abs(a.background) <= largest,
+            fmt::format("--background: expected a number within {:.9g}, the largest of {}-bit floats, got {}",
+                        largest, a.half ? 16 : 32, a.background));
+    if (a.unitScale)
+        require(*a.unitScale >= kSmallestUnitScale && *a.unitScale <= kLargestUnitScale,
+                fmt::format("--unit-scale: expected {} to {}, got {}", kSmallestUnitScale, kLargestUnitScale,
+                            *a.unitScale));
     require(a.dryRun || !a.output.empty(), "resample: no output given (-o out.vdb)");
 }
 
@@ -212,7 +221,7 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     command.footer(R"(Examples:
   tessera resample flow.vtu -o flow.vdb
   tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
-  tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --extend 2 --half
+  tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
   tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
   tessera resample 'run_*.vtu' -o 'out_####.vdb' --json report.json)");
 }
@@ -230,7 +239,7 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.write.halfFloat = a.half;
     s.write.background = float(a.background);
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
-    s.write.unitScale = a.unitScale;
+    s.write.unitScale = a.unitScale.value_or(0);
     s.write.maxFlatVoxels = s.refine.maxVoxels;
     s.write.algorithm = a.algorithm;
     s.write.criterion = a.refine;

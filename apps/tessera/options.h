@@ -36,9 +36,9 @@ struct ResampleArguments {
     std::optional<std::string> maxError;
     double samplesPerElement = 2;
     int brickSize = 16;
-    int extendLayers = 0;
+    std::optional<int> extendLayers;  ///< not given: 1 for the flat layout, 0 for levels
     double background = 0;
-    double unitScale = 0;
+    std::optional<double> unitScale;  ///< not given: 1, or a power of ten when voxels are tiny
     int timeStep = -1;
     std::string fields, errorFields, bounds, like, maxVoxels, maxMemory;
     bool half = false;

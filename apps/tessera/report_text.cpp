@@ -10,7 +10,7 @@ namespace tessera {
 namespace {
 
 std::string place(const Vec3d& p) {
-    return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
+    return fmt::format("({:.9g}, {:.9g}, {:.9g})", p.x, p.y, p.z);
 }
 
 std::string percent(double share) {
@@ -85,6 +85,7 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
     appendCount(oddities, s.coincidentNodes, "coincident nodes");
     appendCount(oddities, s.nonConformingFaces, "non-conforming faces");
     if (!oddities.empty()) text += fmt::format("  {}\n", oddities);
+    if (s.elements > 0 && s.flat == s.elements) text += "  nothing to sample: every element is flat\n";
     for (const std::string& warning : s.warnings) text += fmt::format("  warning: {}\n", warning);
     return text;
 }
@@ -116,6 +117,10 @@ std::string errorText(const ErrorReport& report) {
     std::vector<std::vector<std::string>> rows{
         {"error", "max", "of range", "99.9 %", "of range", "rms", "of range", "worst at"}};
     for (const FieldError& f : report.fields) {
+        if (f.samples == 0) {
+            rows.push_back({f.name, "-", "-", "-", "-", "-", "-", "-"});
+            continue;
+        }
         const bool constant = f.range == 0;
         const auto share = [&](double value) { return constant ? std::string("-") : percent(value); };
         rows.push_back({f.name, fmt::format("{:.4g}", f.max), share(f.relativeMax),

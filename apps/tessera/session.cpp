@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <string>
 
 #include "commands.h"
 #include "interrupt.h"
@@ -17,6 +18,12 @@ void Session::print(const std::string& text) {
     if (!prints_) return;
     std::fputs(text.c_str(), stdout);
     std::fflush(stdout);
+}
+
+void Session::warn(const std::string& text) {
+    progress.clear();
+    const std::string line = "tessera: warning: " + text + "\n";
+    std::fputs(line.c_str(), stderr);
 }
 
 }  // namespace tessera

@@ -38,7 +38,8 @@ BrickRange bricksMeeting(const Box3d& index, int brickCells) {
     const double inverse = 1.0 / brickCells;
     const Vec3d low = glm::clamp(index.min * inverse, Vec3d(-kFar), Vec3d(kFar));
     const Vec3d high = glm::clamp((index.max + kBrickSlackVoxels) * inverse, Vec3d(-kFar), Vec3d(kFar));
-    return {Vec3i(glm::floor(low)), Vec3i(glm::floor(high))};
+    return {{floorToInt(low.x), floorToInt(low.y), floorToInt(low.z)},
+            {floorToInt(high.x), floorToInt(high.y), floorToInt(high.z)}};
 }
 
 BrickRange clippedRange(const PlanFrame& frame, int depth) {
@@ -93,6 +94,7 @@ void BrickPlan::allocateRoots(const Execution& execution) {
     parallelForChunks(execution, count, kElementChunk, [&](std::int64_t begin, std::int64_t end) {
         auto& list = found[std::size_t(begin / kElementChunk)];
         for (std::int64_t e = begin; e < end; ++e) {
+            prefetchNodes(*mesh_, std::min(e + kPrefetchElements, count - 1));
             const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
             BrickRange range = bricksMeeting(element.bounds(), frame_.brickCells);
             range = {glm::max(range.min, all.min), glm::min(range.max, all.max)};
@@ -146,14 +148,26 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
         boxes[std::size_t(c)] = brickTouchBox(made[std::size_t(c)].key, frame_.brickCells);
         allowed[std::size_t(c)] = insideBounds(made[std::size_t(c)].key, frame_);
     }
-    for (const std::int32_t e : brick.elements) {
+    const std::size_t count = brick.elements.size();
+    for (std::size_t n = 0; n < count; ++n) {
+        const std::int32_t e = brick.elements[n];
+        prefetchNodes(*mesh_, brick.elements[std::min(n + std::size_t(kPrefetchElements), count - 1)]);
         const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
+        // Per axis the lower and the upper children share their bounds.
+        const Box3d& own = element.bounds();
+        std::array<bool, 6> touched;
+        for (int a = 0; a < 3; ++a)
+            for (int upper = 0; upper < 2; ++upper) {
+                const Box3d& half = boxes[upper ? 7 : 0];
+                touched[std::size_t(2 * a + upper)] = own.min[a] < half.max[a] && own.max[a] >= half.min[a];
+            }
         std::array<std::size_t, 8> hits;
-        std::size_t count = 0;
+        std::size_t hitCount = 0;
         for (std::size_t c = 0; c < 8; ++c)
-            if (allowed[c] && element.boundsTouch(boxes[c])) hits[count++] = c;
-        for (std::size_t i = 0; i < count; ++i)
-            if (count == 1 || element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
+            if (allowed[c] && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
+                hits[hitCount++] = c;
+        for (std::size_t i = 0; i < hitCount; ++i)
+            if (hitCount == 1 || element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
     }
     splitSamples(brick, made);
     std::erase_if(made, [](const PlannedBrick& child) { return child.elements.empty(); });
@@ -271,21 +285,69 @@ BrickTree BrickPlan::tree(int finestDepth) const {
 
 namespace {
 
+// Marks of a box of bricks, one byte each, set from any thread.
+class BrickMarks {
+  public:
+    explicit BrickMarks(const BrickRange& range)
+        : range_(range),
+          size_(range.max - range.min + 1),
+          marks_(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z), 0) {}
+    std::size_t position(int x, int y, int z) const {
+        return (std::size_t(z - range_.min.z) * std::size_t(size_.y) + std::size_t(y - range_.min.y)) *
+                   std::size_t(size_.x) +
+               std::size_t(x - range_.min.x);
+    }
+    std::atomic_ref<std::uint8_t> at(std::size_t position) {
+        return std::atomic_ref<std::uint8_t>(marks_[position]);
+    }
+    std::atomic_ref<std::uint8_t> at(int x, int y, int z) { return at(position(x, y, z)); }
+    std::int64_t count() const {
+        std::int64_t sum = 0;
+        for (const std::uint8_t mark : marks_) sum += mark;
+        return sum;
+    }
+
+  private:
+    BrickRange range_;
+    Vec3i size_;
+    std::vector<std::uint8_t> marks_;
+};
+
 // The brick that a node lies in, and on which axes the slack puts it into the next one too.
 struct NodeBrick {
     Vec3i brick;
     std::uint32_t nextAxes;
 };
 
-std::vector<NodeBrick> nodeBricks(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution) {
-    std::vector<NodeBrick> result(mesh.points.size());
+// The bricks of the nodes: as positions among the marks where one brick is all there is to a node (most
+// elements are settled by these), else kSeveral; and in full.
+struct NodeBricks {
+    static constexpr std::uint32_t kSeveral = ~std::uint32_t(0);
+    std::vector<std::uint32_t> position;
+    std::vector<NodeBrick> brick;
+    /// The only brick that the element's nodes lie in, or kSeveral.
+    std::uint32_t single(const std::array<std::int32_t, 4>& tet) const {
+        const std::uint32_t first = position[std::size_t(tet[0])];
+        const bool same = first == position[std::size_t(tet[1])] && first == position[std::size_t(tet[2])] &&
+                          first == position[std::size_t(tet[3])];
+        return same ? first : kSeveral;
+    }
+};
+
+NodeBricks nodeBricks(const TetMesh& mesh, const PlanFrame& frame, const BrickRange& all,
+                      const BrickMarks& marks, const Execution& execution) {
+    NodeBricks result{std::vector<std::uint32_t>(mesh.points.size(), NodeBricks::kSeveral),
+                      std::vector<NodeBrick>(mesh.points.size())};
     const double inverse = 1.0 / frame.spacingWorld(frame.maxDepth);
     parallelForChunks(execution, mesh.nodeCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t n = begin; n < end; ++n) {
             const Vec3d index = (mesh.points[std::size_t(n)] - frame.originWorld) * inverse;
             const BrickRange range = bricksMeeting({index, index}, frame.brickCells);
             const Vec3i next = range.max - range.min;
-            result[std::size_t(n)] = {range.min, std::uint32_t(next.x | next.y << 1 | next.z << 2)};
+            result.brick[std::size_t(n)] = {range.min, std::uint32_t(next.x | next.y << 1 | next.z << 2)};
+            const Vec3i& b = range.min;
+            if (range.min == range.max && glm::clamp(b, all.min, all.max) == b)
+                result.position[std::size_t(n)] = std::uint32_t(marks.position(b.x, b.y, b.z));
         }
     });
     return result;
@@ -305,31 +367,6 @@ BrickRange elementRange(const TetMesh& mesh, const std::vector<NodeBrick>& nodes
     return range;
 }
 
-// Marks of a box of bricks, one byte each, set from any thread.
-class BrickMarks {
-  public:
-    explicit BrickMarks(const BrickRange& range)
-        : range_(range),
-          size_(range.max - range.min + 1),
-          marks_(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z), 0) {}
-    std::atomic_ref<std::uint8_t> at(int x, int y, int z) {
-        return std::atomic_ref<std::uint8_t>(
-            marks_[(std::size_t(z - range_.min.z) * std::size_t(size_.y) + std::size_t(y - range_.min.y)) *
-                       std::size_t(size_.x) +
-                   std::size_t(x - range_.min.x)]);
-    }
-    std::int64_t count() const {
-        std::int64_t sum = 0;
-        for (const std::uint8_t mark : marks_) sum += mark;
-        return sum;
-    }
-
-  private:
-    BrickRange range_;
-    Vec3i size_;
-    std::vector<std::uint8_t> marks_;
-};
-
 }  // namespace
 
 std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit,
@@ -339,19 +376,25 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
     if (rangeCount(range) > kDenseLimit) return -1;
     BrickMarks marks(range);
     const double spacing = frame.spacingWorld(depth);
-    const std::vector<NodeBrick> nodes = nodeBricks(mesh, frame, execution);
+    const NodeBricks nodes = nodeBricks(mesh, frame, range, marks, execution);
+    const std::int64_t last = mesh.elementCount() - 1;
     parallelForChunks(
         execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
             std::optional<ElementOverlap> element;
             for (std::int64_t e = begin; e < end; ++e) {
-                const BrickRange own = elementRange(mesh, nodes, e);
+                for (const std::int32_t n : mesh.tets[std::size_t(std::min(e + kPrefetchElements, last))])
+                    __builtin_prefetch(&nodes.position[std::size_t(n)]);
+                // Most bricks are marked already by an earlier element.
+                const std::uint32_t single = nodes.single(mesh.tets[std::size_t(e)]);
+                if (single != NodeBricks::kSeveral && marks.at(single).load(std::memory_order_relaxed))
+                    continue;
+                const BrickRange own = elementRange(mesh, nodes.brick, e);
                 const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
                 element.reset();
                 for (int z = low.z; z <= high.z; ++z)
                     for (int y = low.y; y <= high.y; ++y)
                         for (int x = low.x; x <= high.x; ++x) {
-                            // Most bricks are marked already by an earlier element: the exact test runs
-                            // rarely.
+                            // Likewise: the exact test runs rarely.
                             auto mark = marks.at(x, y, z);
                             if (mark.load(std::memory_order_relaxed)) continue;
                             if (!element)

@@ -159,11 +159,10 @@ bool BrickTree::isRefined(const BrickKey& key) const {
 }
 
 std::int64_t BrickTree::findLeafAt(const Vec3d& index0) const {
-    const Vec3d floored = glm::floor(index0);
     constexpr double kLimit = 2147483647.0;
-    if (!(std::abs(floored.x) < kLimit && std::abs(floored.y) < kLimit && std::abs(floored.z) < kLimit))
+    if (!(std::abs(index0.x) < kLimit && std::abs(index0.y) < kLimit && std::abs(index0.z) < kLimit))
         return -1;
-    return findLeafAt(0, Vec3i(floored));
+    return findLeafAt(0, {floorToInt(index0.x), floorToInt(index0.y), floorToInt(index0.z)});
 }
 
 std::int64_t BrickTree::findLeafAt(int level, const Vec3i& p) const {

@@ -10,6 +10,13 @@
 
 namespace tessera {
 
+/// Floor of a number whose floor fits an int, without the library call that std::floor is on older
+/// processors.
+inline int floorToInt(double v) {
+    const int truncated = int(v);
+    return truncated - (v < double(truncated) ? 1 : 0);
+}
+
 /// A brick of brickCells^3 cells of one level. It owns the lattice points [index * B, index * B + B) of that
 /// level (half-open); its closed box has B + 1 points along each axis. Level 0 is the finest; level l + 1 has
 /// every second lattice point of level l, so brick (l, b) is the union of the eight bricks (l - 1, 2 b + {0,

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "brick/leaf_tiles.h"
 #include "mesh/geometry.h"
 
 namespace tessera {
@@ -27,8 +28,8 @@ SampledField describe(const Field& field, int firstChannel) {
 
 }  // namespace
 
-ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
-    : mesh_(&mesh), centroid_(mesh.tets.size()), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
+SampledMesh::SampledMesh(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
+    : mesh_(&mesh) {
     TESSERA_CHECK(mesh.points.size() + mesh.tets.size() < (std::size_t(1) << 32),
                   "samples are counted in 32 bits");
     fields_.resize(fields.size());
@@ -41,49 +42,32 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
             describe(mesh.fields[std::size_t(fields[std::size_t(f)])], fields_[std::size_t(f)].firstChannel);
     });
     if (!mesh.points.empty()) reference_ = mesh.points[0];
-    std::atomic<std::int64_t> flat{0}, inverted{0};
+}
+
+ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
+    : SampledMesh(mesh, fields, execution), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
     parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        std::int64_t chunkFlat = 0, chunkInverted = 0;
         for (std::int64_t e = begin; e < end; ++e) {
             const auto& tet = mesh.tets[std::size_t(e)];
             const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
                         &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
-            const int sign = volumeSign(a, b, c, d);
-            chunkFlat += sign == 0;
-            chunkInverted += sign < 0;
-            if (sign == 0) continue;
-            const double sixfold = glm::dot(glm::cross(b - a, c - a), d - a);
-            // A volume that underflows or cancels to 0 in double still belongs to an element that is there.
-            volume_[std::size_t(e)] =
-                std::max(std::abs(sixfold) / 6, std::numeric_limits<double>::denorm_min());
-            centroid_[std::size_t(e)] =
-                0.25 * (((a - reference_) + (b - reference_)) + ((c - reference_) + (d - reference_)));
+            const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
+            if (!(std::abs(sixfold.value) > sixfold.errorBound) && exactVolumeSign(a, b, c, d) == 0) continue;
+            volume_[std::size_t(e)] = elementVolume(sixfold.value);
             for (const std::int32_t node : tet) {
                 std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
                 if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
             }
         }
-        flat += chunkFlat;
-        inverted += chunkInverted;
     });
-    flat_ = flat;
-    inverted_ = inverted;
-}
-
-// A cell's value, a node's value, or the mean of an element's four.
-double ErrorSamples::exactValue(std::size_t sample, const Field& field, int component) const {
-    if (sample < usedNode_.size()) return field.at(std::int64_t(sample), component);
-    const std::size_t element = sample - usedNode_.size();
-    if (field.location == FieldLocation::cell) return field.at(std::int64_t(element), component);
-    const auto& tet = mesh_->tets[element];
-    return 0.25 * (field.at(tet[0], component) + field.at(tet[1], component) + field.at(tet[2], component) +
-                   field.at(tet[3], component));
 }
 
 namespace {
 
 constexpr std::int32_t kNoSample = -2;
 constexpr std::int32_t kOutside = -1;
+
+}  // namespace
 
 std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0) {
     std::int64_t leaf = tree.findLeafAt(index0);
@@ -97,13 +81,6 @@ std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0) {
     }
     return leaf < 0 ? kOutside : std::int32_t(leaf);
 }
-
-bool contains(const Box3d& box, const Vec3d& p) {
-    return p.x >= box.min.x && p.y >= box.min.y && p.z >= box.min.z && p.x <= box.max.x && p.y <= box.max.y &&
-           p.z <= box.max.z;
-}
-
-}  // namespace
 
 SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
                           const std::optional<Box3d>& boundsWorld, const Execution& execution) {
@@ -125,7 +102,6 @@ SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
     sorted.first.assign(tree.leafCount() + 1, 0);
     for (const std::int32_t leaf : leafOf) {
         if (leaf >= 0) ++sorted.first[std::size_t(leaf) + 1];
-        sorted.outside += leaf == kOutside;
     }
     for (std::size_t i = 1; i < sorted.first.size(); ++i) sorted.first[i] += sorted.first[i - 1];
     sorted.ids.resize(sorted.first.back());
@@ -135,7 +111,7 @@ SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
     return sorted;
 }
 
-LeafSampler::LeafSampler(const ErrorSamples& samples, const BrickTree& tree, const BrickStore& store,
+LeafSampler::LeafSampler(const SampledMesh& samples, const BrickTree& tree, const BrickStore& store,
                          const Reconstruction& reconstruction)
     : samples_(&samples),
       tree_(&tree),
@@ -155,13 +131,7 @@ void LeafSampler::enter(std::size_t leaf) {
     touched_.clear();
     slotValues_.clear();
     slotCovered_.clear();
-    coarserNear_ = false;
-    if (key.level + 1 >= tree_->levelCount()) return;
-    for (int n = 0; n < 27 && !coarserNear_; ++n) {
-        const BrickKey near{key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
-        const std::int64_t other = tree_->findCovering(near);
-        coarserNear_ = other >= 0 && tree_->leaves()[std::size_t(other)].level > key.level;
-    }
+    coarserNear_ = hasCoarserNeighbour(*tree_, leaf);
 }
 
 bool LeafSampler::readCorners(const Vec3i& cell, Corners& corners) const {

@@ -7,146 +7,64 @@
 #include <limits>
 
 #include "base/error.h"
-#include "brick/error_samples.h"
+#include "brick/sample_errors.h"
 
 namespace tessera {
 
 namespace {
 
 constexpr std::int64_t kLeafChunk = 16;
-constexpr std::int64_t kElementChunk = 16384;
-constexpr double kNodeWeight = 1.0 / 20, kCentroidWeight = 4.0 / 5;
+// Errors that are not negative sort as their bits do; bins by the exponent and the first bits after it.
+constexpr int kBinShift = 20;
+constexpr std::size_t kBins = std::size_t(0x7f800000u >> kBinShift) + 1;
 
-// The largest error of one field among the samples of one leaf or of all.
-struct Worst {
-    double error = -1;
-    std::uint32_t sample = 0;
-    void take(double e, std::uint32_t s) {
-        if (e > error || (e == error && s < sample)) {
-            error = e;
-            sample = s;
-        }
-    }
+struct ErrorHistogram {
+    std::array<std::uint32_t, kBins> bins{};
+    std::int64_t skipped = 0;
 };
 
-// Errors of every sample, one list a field, as floats in units of the field's range: NaN where skipped, -1
-// where there is no sample.
-using ErrorLists = std::vector<std::vector<float>>;
-
-struct SampleTotals {
-    std::vector<Worst> worst;  // one a field
-    std::int64_t fullyCovered = 0;
-};
-
-double unitOf(const SampledField& field) {
-    return field.range > 0 ? field.range : 1;
+std::size_t binOf(float error) {
+    return std::bit_cast<std::uint32_t>(error) >> kBinShift;
 }
 
-SampleTotals measureSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, const BrickTree& tree,
-                            const BrickStore& store, const Reconstruction& reconstruction, ErrorLists& lists,
-                            const Execution& execution, std::vector<double>* leafErrors) {
-    const std::size_t fields = samples.fields().size();
-    const std::int64_t leaves = std::int64_t(tree.leafCount());
-    const std::size_t chunks = std::size_t((leaves + kLeafChunk - 1) / kLeafChunk);
-    std::vector<SampleTotals> totals(chunks);
-    parallelForChunks(execution, leaves, kLeafChunk, [&](std::int64_t begin, std::int64_t end) {
-        SampleTotals& total = totals[std::size_t(begin / kLeafChunk)];
-        total.worst.resize(fields);
-        LeafSampler sampler(samples, tree, store, reconstruction);
-        std::vector<double> errors(fields);
-        for (std::int64_t leaf = begin; leaf < end; ++leaf) {
-            if (sorted.of(std::size_t(leaf)).empty()) continue;
-            sampler.enter(std::size_t(leaf));
-            double largest = 0;
-            for (const std::uint32_t sample : sorted.of(std::size_t(leaf))) {
-                total.fullyCovered += sampler.measure(sample, errors) ? 1 : 0;
-                for (std::size_t f = 0; f < fields; ++f) {
-                    const double unit = unitOf(samples.fields()[f]);
-                    lists[f][sample] = errors[f] < 0 ? -1.0f : float(errors[f] / unit);
-                    total.worst[f].take(errors[f], sample);
-                    if (samples.fields()[f].range > 0 && errors[f] > largest * unit)
-                        largest = errors[f] / unit;
-                }
-            }
-            if (leafErrors) (*leafErrors)[std::size_t(leaf)] = largest;
+std::vector<ErrorHistogram> binErrors(const std::vector<float>& list, const Execution& execution) {
+    constexpr std::int64_t kMostParts = 64;  // whatever the size: counts add up the same in any order
+    const std::int64_t count = std::int64_t(list.size());
+    const std::int64_t chunk = std::max(std::int64_t(65536), (count + kMostParts - 1) / kMostParts);
+    std::vector<ErrorHistogram> parts(std::size_t((count + chunk - 1) / chunk));
+    parallelForChunks(execution, count, chunk, [&](std::int64_t begin, std::int64_t end) {
+        ErrorHistogram& part = parts[std::size_t(begin / chunk)];
+        for (std::int64_t i = begin; i < end; ++i) {
+            const float error = list[std::size_t(i)];
+            if (error >= 0)
+                ++part.bins[binOf(error)];
+            else
+                part.skipped += std::isnan(error);
         }
     });
-    SampleTotals all;
-    all.worst.resize(fields);
-    for (const SampleTotals& total : totals) {
-        all.fullyCovered += total.fullyCovered;
-        for (std::size_t f = 0; f < fields; ++f)
-            if (total.worst[f].error >= 0) all.worst[f].take(total.worst[f].error, total.worst[f].sample);
-    }
-    return all;
+    return parts;
 }
 
 // 99.9 % of the errors are at most this, in the lists' unit; also counts what was measured and what was
-// skipped.
-double quantile999(const std::vector<float>& list, FieldError& result) {
-    std::vector<float> measured;
-    measured.reserve(list.size());
-    for (const float error : list) {
-        if (error >= 0) measured.push_back(error);
-        result.skippedSamples += std::isnan(error);
+// skipped. Only the bin that holds the quantile is sorted.
+double quantile999(const std::vector<float>& list, FieldError& result, const Execution& execution) {
+    std::array<std::int64_t, kBins> total{};
+    for (const ErrorHistogram& part : binErrors(list, execution)) {
+        for (std::size_t bin = 0; bin < kBins; ++bin) total[bin] += part.bins[bin];
+        result.skippedSamples += part.skipped;
     }
-    result.samples = std::int64_t(measured.size());
-    if (measured.empty()) return 0;
-    const auto at = measured.begin() + std::ptrdiff_t(std::ceil(0.999 * double(measured.size())) - 1);
-    std::nth_element(measured.begin(), at, measured.end());
+    for (const std::int64_t count : total) result.samples += count;
+    if (result.samples == 0) return 0;
+    std::int64_t rank = std::int64_t(std::ceil(0.999 * double(result.samples))) - 1;
+    std::size_t bin = 0;
+    while (rank >= total[bin]) rank -= total[bin++];
+    std::vector<float> within;
+    within.reserve(std::size_t(total[bin]));
+    for (const float error : list)
+        if (error >= 0 && binOf(error) == bin) within.push_back(error);
+    const auto at = within.begin() + std::ptrdiff_t(rank);
+    std::nth_element(within.begin(), at, within.end());
     return double(*at);
-}
-
-// Sums over elements: weighted squared errors, and the integral of the exact field.
-struct ElementSums {
-    double squares = 0, weights = 0;
-    std::vector<double> integral;
-};
-
-ElementSums sumElements(const ErrorSamples& samples, const SampledField& sampled,
-                        const std::vector<float>& list, std::int64_t begin, std::int64_t end) {
-    ElementSums sums;
-    const Field& field = *sampled.field;
-    sums.integral.assign(std::size_t(field.components), 0);
-    const std::size_t nodes = samples.nodeCount();
-    const auto take = [&](std::size_t sample, double weight) {
-        const double error = double(list[sample]);
-        if (!(error >= 0)) return;
-        sums.squares += weight * error * error;
-        sums.weights += weight;
-    };
-    for (std::int64_t e = begin; e < end; ++e) {
-        const double volume = samples.volumeWorld(std::size_t(e));
-        if (volume == 0) continue;
-        const std::size_t centroid = nodes + std::size_t(e);
-        take(centroid, sampled.isCell() ? volume : kCentroidWeight * volume);
-        if (!sampled.isCell())
-            for (const std::int32_t node : samples.mesh().tets[std::size_t(e)])
-                take(std::size_t(node), kNodeWeight * volume);
-        for (int c = 0; c < field.components; ++c) {
-            const double mean = samples.exactValue(centroid, field, c);
-            if (std::isfinite(mean)) sums.integral[std::size_t(c)] += volume * mean;
-        }
-    }
-    return sums;
-}
-
-void sumOverElements(const ErrorSamples& samples, const SampledField& sampled, const std::vector<float>& list,
-                     FieldError& result, const Execution& execution) {
-    const std::int64_t count = samples.mesh().elementCount();
-    std::vector<ElementSums> parts(std::size_t((count + kElementChunk - 1) / kElementChunk));
-    parallelForChunks(execution, count, kElementChunk, [&](std::int64_t begin, std::int64_t end) {
-        parts[std::size_t(begin / kElementChunk)] = sumElements(samples, sampled, list, begin, end);
-    });
-    double squares = 0, weights = 0;
-    result.integralMesh.assign(std::size_t(result.components), 0);
-    for (const ElementSums& part : parts) {
-        squares += part.squares;
-        weights += part.weights;
-        for (std::size_t c = 0; c < result.integralMesh.size(); ++c)
-            result.integralMesh[c] += part.integral[c];
-    }
-    result.rms = weights > 0 ? std::sqrt(squares / weights) * unitOf(sampled) : 0;
 }
 
 // Sums over stored points: one entry a channel, then valid points one a field.
@@ -230,17 +148,21 @@ StoredSums sumStored(std::span<const SampledField> fields, const BrickTree& tree
     return all;
 }
 
-FieldError fieldReport(const ErrorSamples& samples, const SampledField& sampled,
-                       const std::vector<float>& list, const Worst& worst, const Execution& execution) {
+FieldError fieldReport(const SampledMesh& samples, std::size_t f, const SampleErrors& errors,
+                       const Execution& execution) {
+    const SampledField& sampled = samples.fields()[f];
+    const FieldSums& sums = errors.sums[f];
     FieldError result;
     result.name = sampled.field->name;
     result.components = sampled.field->components;
     result.location = sampled.isCell() ? "cell" : "point";
     result.range = sampled.range;
-    result.max = std::max(0.0, worst.error);
-    if (worst.error >= 0) result.worstPlaceWorld = samples.placeWorld(worst.sample, Vec3d(0));
-    result.p999 = std::min(result.max, quantile999(list, result) * unitOf(sampled));
-    sumOverElements(samples, sampled, list, result, execution);
+    result.max = std::max(0.0, sums.worst.error);
+    if (sums.worst.error >= 0) result.worstPlaceWorld = samples.placeWorld(sums.worst.sample, Vec3d(0));
+    const double unit = errorUnit(sampled);
+    result.p999 = std::min(result.max, quantile999(errors.lists[f], result, execution) * unit);
+    result.rms = sums.weights > 0 ? std::sqrt(sums.squares / sums.weights) * unit : 0;
+    result.integralMesh = sums.integralMesh;
     if (sampled.range > 0) {
         result.relativeMax = result.max / sampled.range;
         result.relativeP999 = result.p999 / sampled.range;
@@ -249,43 +171,38 @@ FieldError fieldReport(const ErrorSamples& samples, const SampledField& sampled,
     return result;
 }
 
-void countSamples(const ErrorSamples& samples, const SamplesByLeaf& sorted, std::int64_t fullyCovered,
-                  ErrorReport& report) {
-    for (const std::uint32_t sample : sorted.ids)
-        ++(sample < samples.nodeCount() ? report.nodes : report.centroids);
-    report.outsideBricks = sorted.outside;
-    report.flatElements = samples.flatElements();
-    report.invertedElements = samples.invertedElements();
-    report.fullyCoveredShare = sorted.ids.empty() ? 0 : double(fullyCovered) / double(sorted.ids.size());
+void countSamples(const SampleErrors& errors, ErrorReport& report) {
+    report.nodes = errors.nodes;
+    report.centroids = errors.centroids;
+    report.outsideBricks = errors.outside;
+    report.flatElements = errors.flatElements;
+    report.invertedElements = errors.invertedElements;
+    const std::int64_t all = errors.nodes + errors.centroids;
+    report.fullyCoveredShare = all > 0 ? double(errors.fullyCovered) / double(all) : 0;
 }
 
 ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                         const BrickStore& store, const Reconstruction& reconstruction,
                         const Execution& execution, const MeasureOptions& options) {
-    std::optional<ErrorSamples> own;
+    std::optional<SampledMesh> own;
     if (!options.samples) own.emplace(mesh, fields, execution);
-    const ErrorSamples& samples = options.samples ? *options.samples : *own;
+    const SampledMesh& samples = options.samples ? *options.samples : *own;
     TESSERA_CHECK(samples.fields().size() == fields.size() && samples.channels() == store.channels(),
                   "the samples are for these fields");
-    if (options.leafErrors) options.leafErrors->assign(tree.leafCount(), 0.0);
     execution.report("verify", 0, 3);
-    const SamplesByLeaf sorted = sortSamples(samples, tree, options.boundsWorld, execution);
+    const SampleErrors errors = measureSamples(samples, tree, store, reconstruction, options.boundsWorld,
+                                               execution, options.leafErrors);
     execution.report("verify", 1, 3);
-    ErrorLists lists(fields.size(), std::vector<float>(samples.count(), -1.0f));
-    const SampleTotals totals =
-        measureSamples(samples, sorted, tree, store, reconstruction, lists, execution, options.leafErrors);
-    execution.report("verify", 2, 3);
-
     ErrorReport report;
-    countSamples(samples, sorted, totals.fullyCovered, report);
+    countSamples(errors, report);
     const StoredSums stored = sumStored(samples.fields(), tree, store, execution);
     report.coveredPoints = stored.covered;
+    execution.report("verify", 2, 3);
     for (std::size_t f = 0; f < fields.size(); ++f) {
-        const SampledField& sampled = samples.fields()[f];
-        report.fields.push_back(fieldReport(samples, sampled, lists[f], totals.worst[f], execution));
+        report.fields.push_back(fieldReport(samples, f, errors, execution));
         FieldError& result = report.fields.back();
         result.validPoints = stored.valid[f];
-        const auto first = stored.sum.begin() + sampled.firstChannel;
+        const auto first = stored.sum.begin() + samples.fields()[f].firstChannel;
         result.integralLattice.assign(first, first + result.components);
     }
     execution.report("verify", 3, 3);

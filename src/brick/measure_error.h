@@ -14,13 +14,13 @@
 
 namespace tessera {
 
-class ErrorSamples;
+class SampledMesh;
 
 struct MeasureOptions {
     /// Samples outside this box are counted, not measured: the box that the tree was made for.
     std::optional<Box3d> boundsWorld;
-    /// When not null: the places and volumes of the same mesh and fields, from an earlier measurement.
-    const ErrorSamples* samples = nullptr;
+    /// When not null: the same mesh and fields, described for an earlier measurement.
+    const SampledMesh* samples = nullptr;
     /// When not null: receives the largest relative error of any field in each leaf (drives refinement),
     /// leafCount entries.
     std::vector<double>* leafErrors = nullptr;

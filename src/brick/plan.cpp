@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <string>
 
 #include "base/error.h"
@@ -29,6 +28,7 @@ std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Executio
     std::vector<float> sizes(mesh.tets.size());
     parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t e = begin; e < end; ++e) {
+            prefetchNodes(mesh, std::min(e + kPrefetchElements, mesh.elementCount() - 1));
             const auto nodes = elementInIndexSpace(mesh, e, Vec3d(0), unit);
             double product = 1;
             for (std::size_t a = 0; a < 4; ++a)
@@ -42,16 +42,18 @@ std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Executio
     return sizes;
 }
 
-// The size that a brick's spacing follows; infinite when no element has one.
-double localSize(const PlannedBrick& brick, const std::vector<float>& sizes) {
-    std::vector<float> local;
-    local.reserve(brick.elements.size());
-    for (const std::int32_t e : brick.elements)
-        if (sizes[std::size_t(e)] > 0) local.push_back(sizes[std::size_t(e)]);
-    if (local.empty()) return std::numeric_limits<double>::infinity();
-    const auto at = local.begin() + std::ptrdiff_t(kSizeQuantile * double(local.size()));
-    std::nth_element(local.begin(), at, local.end());
-    return double(*at);
+// Whether the size that a brick's spacing follows, the kSizeQuantile quantile of its elements' sizes, is too
+// small for a spacing. Counting tells without sorting; elements without a size don't count.
+bool isTooCoarse(const PlannedBrick& brick, const std::vector<float>& sizes, double spacing,
+                 double samplesPerElement) {
+    std::int64_t count = 0, smaller = 0;
+    for (const std::int32_t e : brick.elements) {
+        const float size = sizes[std::size_t(e)];
+        if (!(size > 0)) continue;
+        ++count;
+        smaller += spacing > double(size) / samplesPerElement;
+    }
+    return smaller > std::int64_t(kSizeQuantile * double(count));
 }
 
 std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxLeaves,
@@ -92,7 +94,15 @@ int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions o
 }
 
 std::string budgetText(const RefineOptions& options, std::size_t maxLeaves) {
-    const double points = double(maxLeaves) * std::pow(options.brickCells, 3);
+    const double brickPoints = std::pow(options.brickCells, 3);
+    if (maxLeaves == 0)  // zero voxels would say nothing of the bound that was given
+        return (options.maxVoxels > 0
+                    ? "the given bound of " + shortNumber(double(options.maxVoxels)) + " voxels"
+                : options.maxMemoryBytes > 0
+                    ? "the given bound of " + shortNumber(double(options.maxMemoryBytes)) + " bytes"
+                    : std::string("a quarter of the memory here")) +
+               " holds (one brick is " + shortNumber(brickPoints) + " voxels)";
+    const double points = double(maxLeaves) * brickPoints;
     return shortNumber(points) + " voxels (" +
            (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound"
                                                                 : "a quarter of the memory here") +
@@ -141,7 +151,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
             const PlannedBrick& brick = *leaves[std::size_t(i)];
             if (brick.key.level != depth) return;
             const double spacing = std::ldexp(1.0, -depth);  // in units of the root spacing, as the sizes are
-            wanted[std::size_t(i)] = spacing > localSize(brick, sizes) / options.samplesPerElement ? 1 : 0;
+            wanted[std::size_t(i)] = isTooCoarse(brick, sizes, spacing, options.samplesPerElement) ? 1 : 0;
         });
         std::vector<BrickKey> splits;
         for (std::size_t i = 0; i < leaves.size(); ++i)

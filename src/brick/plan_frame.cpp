@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "brick/used_nodes.h"
 
 namespace tessera {
 
@@ -53,12 +54,12 @@ double finestSpacing(const RefineOptions& options, double longest) {
 
 Box3d meshBounds(const TetMesh& mesh, const Execution& execution) {
     constexpr std::int64_t kChunk = 16384;
-    std::vector<Box3d> parts(std::size_t((mesh.elementCount() + kChunk - 1) / kChunk));
-    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
+    const std::vector<std::uint8_t> used = usedNodes(mesh, execution);
+    std::vector<Box3d> parts(std::size_t((mesh.nodeCount() + kChunk - 1) / kChunk));
+    parallelForChunks(execution, mesh.nodeCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
         Box3d box;
-        for (std::int64_t e = begin; e < end; ++e)
-            for (const std::int32_t node : mesh.tets[std::size_t(e)])
-                box.include(mesh.points[std::size_t(node)]);
+        for (std::int64_t n = begin; n < end; ++n)
+            if (used[std::size_t(n)]) box.include(mesh.points[std::size_t(n)]);
         parts[std::size_t(begin / kChunk)] = box;
     });
     Box3d all;

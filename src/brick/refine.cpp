@@ -50,10 +50,16 @@ std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fi
         if (!named && (!options.errorFields.empty() || (isCell && options.measure == ErrorMeasure::max)))
             continue;
         onlyCells = onlyCells && isCell;
+        bool anyFinite = false;
+        for (int c = 0; c < field.components; ++c) anyFinite = anyFinite || !fieldRange(field, c).empty();
+        if (!anyFinite)
+            throw InputError("field " + field.name +
+                             " has no finite value, so no error bound can hold for it");
         const double range = samples.fields()[f].range;
         const double bound = options.maxErrorIsRelative ? options.maxError * range : options.maxError;
         if (bound == 0) continue;  // a constant field has no relative error
-        const double roundOff = std::ldexp(samples.fields()[f].largest, -24);
+        // Half a unit in the last place of the largest value; below 2^-126 floats are 2^-149 apart.
+        const double roundOff = std::max(std::ldexp(samples.fields()[f].largest, -24), 0x1p-150);
         if (bound < roundOff)
             throw InputError(
                 "an error bound of " + shortNumber(bound) + " on field " + field.name +
@@ -73,6 +79,14 @@ std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fi
 void buildIfNeeded(const NearestOnDemand& nearest, const BrickStore& store) {
     const std::int64_t points = std::int64_t(store.leafCount()) * store.tileCount() * kTilePoints;
     if (store.coveredPoints() < points) nearest.get();
+}
+
+// The bound as the caller gave it, for the message that it is too small.
+std::string givenBound(const RefineOptions& options) {
+    if (options.maxVoxels > 0) return ", the given bound " + std::to_string(options.maxVoxels) + " voxels";
+    if (options.maxMemoryBytes > 0)
+        return ", the given bound " + std::to_string(options.maxMemoryBytes) + " bytes";
+    return {};
 }
 
 class ErrorRefinement {
@@ -95,10 +109,10 @@ class ErrorRefinement {
         if (options.maxVoxels == 0 && options.maxMemoryBytes == 0)
             budgetLeaves_ = std::min(budgetLeaves_, std::size_t(kDefaultErrorVoxels / brickPoints()));
         if (plan_.leafCount() > budgetLeaves_)
-            throw InputError("the coarsest plan has " +
-                             std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +
-                             " voxels, more than the " +
-                             std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + " allowed");
+            throw InputError(
+                "the coarsest plan has " + std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +
+                " voxels, more than the " + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) +
+                " allowed; one brick is " + std::to_string(brickPoints()) + " voxels" + givenBound(options));
     }
 
     BrickResult run();
@@ -301,7 +315,8 @@ bool ErrorRefinement::refine() {
 bool ErrorRefinement::withinBound(const ErrorReport& report) const {
     return std::all_of(bounds_.begin(), bounds_.end(), [&](const FieldBound& b) {
         const FieldError& error = report.fields[b.field];
-        return (options_.measure == ErrorMeasure::rms ? error.rms : error.max) <= b.bound;
+        return error.samples > 0 &&
+               (options_.measure == ErrorMeasure::rms ? error.rms : error.max) <= b.bound;
     });
 }
 
@@ -310,9 +325,13 @@ std::string ErrorRefinement::whyStopped(const ErrorReport& report) const {
     double ratio = 0;
     for (const FieldBound& b : bounds_) {
         const FieldError& error = report.fields[b.field];
+        if (error.samples == 0)
+            return "no sample of field " + error.name +
+                   " has a finite value as a 32-bit float, so its error can't be measured";
         const double r = (options_.measure == ErrorMeasure::rms ? error.rms : error.max) / b.bound;
         if (r > ratio) ratio = r, worst = &b;
     }
+    TESSERA_CHECK(worst, "an unmet bound has a field that exceeds it");
     const FieldError& error = report.fields[worst->field];
     const double reached = options_.measure == ErrorMeasure::rms ? error.rms : error.max;
     return (stopped_.empty() ? std::string("no brick left to split") : stopped_) +

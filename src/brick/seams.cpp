@@ -9,30 +9,6 @@
 
 namespace tessera {
 
-namespace {
-
-// Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can tell
-// apart, and more than the rounding of a place in index space.
-constexpr double kOnPlane = 1.0 / (1 << 30);
-
-double snappedFraction(double t) {
-    if (t < kOnPlane) return 0;
-    if (t > 1 - kOnPlane) return 1;
-    return t;
-}
-
-}  // namespace
-
-CellPlace locateInBrick(const Vec3d& local, int brickCells) {
-    CellPlace place;
-    for (int a = 0; a < 3; ++a) {
-        const int cell = std::clamp(int(std::floor(local[a])), 0, brickCells - 1);
-        place.cell[a] = cell;
-        place.fraction[a] = snappedFraction(local[a] - cell);
-    }
-    return place;
-}
-
 Reconstruction::Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                                const BrickStore& store, const NearestPointIndex& nearest)
     : mesh_(&mesh), tree_(&tree), store_(&store), nearest_(&nearest) {

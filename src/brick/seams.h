@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -26,7 +27,20 @@ struct CellPlace {
 };
 /// @param local place in index space of the brick's level, counted from the brick's first point; may be off
 /// by rounding.
-CellPlace locateInBrick(const Vec3d& local, int brickCells);
+inline CellPlace locateInBrick(const Vec3d& local, int brickCells) {
+    // Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can
+    // tell apart, and more than the rounding of a place in index space.
+    constexpr double kOnPlane = 1.0 / (1 << 30);
+    CellPlace place;
+    for (int a = 0; a < 3; ++a) {
+        const double inside = std::clamp(local[a], 0.0, double(brickCells - 1));
+        const int cell = floorToInt(inside);
+        const double t = local[a] - cell;
+        place.cell[a] = cell;
+        place.fraction[a] = t < kOnPlane ? 0 : t > 1 - kOnPlane ? 1 : t;
+    }
+    return place;
+}
 
 /// Corner c of a cell is at (c & 1, c >> 1 & 1, c >> 2); its trilinear weight at `fraction`.
 inline Vec3i cornerOffset(int c) {

@@ -12,6 +12,20 @@ namespace tessera {
 
 namespace {
 
+/// Bytes that a terminal can't show as they are, as \xNN.
+std::string printable(std::string_view word) {
+    constexpr char kDigits[] = "0123456789abcdef";
+    std::string text;
+    for (const char c : word) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (byte >= 0x20 && byte < 0x7f)
+            text += c;
+        else
+            text += {'\\', 'x', kDigits[byte >> 4], kDigits[byte & 15]};
+    }
+    return text;
+}
+
 /// Numbers of a text file, line by line; '#' starts a comment, empty lines don't count.
 class NumberLines {
   public:
@@ -47,7 +61,7 @@ class NumberLines {
         const bool outOfRange = result.ec == std::errc::result_out_of_range;
         if (word.empty() || result.ptr != digits.data() + digits.size() ||
             (result.ec != std::errc() && !(outOfRange && std::is_floating_point_v<Number>)))
-            fail(std::string("expected ") + expected + ", found '" + std::string(word.substr(0, 24)) + "'");
+            fail(std::string("expected ") + expected + ", found '" + printable(word.substr(0, 24)) + "'");
         // from_chars leaves the value alone where it is too small or too large for a double.
         if (outOfRange) value = Number(std::strtod(std::string(digits).c_str(), nullptr));
         line_.remove_prefix(word.size());

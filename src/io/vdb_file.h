@@ -37,7 +37,9 @@ struct VdbWriteOptions {
     UpAxis upAxis = UpAxis::keep;
     double unitScale =
         0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
-    std::int64_t maxFlatVoxels = 0;  ///< flat: bound on points at the finest spacing; 0: 2^31
+    std::int64_t maxFlatVoxels = 0;    ///< flat: bound on points; 0: 2^26. Never above 2^31.
+    std::int64_t maxFlatBytes = 0;     ///< flat: bound on the grids' memory; 0: a quarter of the machine's
+    std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     std::string algorithm, criterion, sourceFile;
 };
 
@@ -45,7 +47,7 @@ struct VdbWriteOptions {
 struct VdbWriteResult {
     std::int64_t activeVoxels = 0;  ///< of all grids
     std::int64_t fileBytes = 0;
-    int flatLevel = 0;  ///< flat: the level whose spacing the grid has (above 0 when maxFlatVoxels capped it)
+    int flatLevel = 0;  ///< flat: the level whose spacing the grid has (above 0 when a bound capped it)
     double unitScale = 1;
     std::vector<std::string> notes;  ///< sentences for the user: unit chosen, size capped
 };
@@ -53,6 +55,17 @@ struct VdbWriteResult {
 /// Throws InputError when two grids would get the same name, or a field the name of the coverage mask. Call
 /// it before long work.
 void checkOutputFields(const std::vector<OutputField>& fields);
+
+/// The grid that the flat layout makes of some bricks.
+struct FlatGridPlan {
+    int level = 0;            ///< the finest one within the bounds of VdbWriteOptions
+    std::int64_t points = 0;  ///< of all bricks at that level's spacing
+    std::int64_t bytes = 0;   ///< values of all channels, and the coverage
+    std::string note;         ///< a sentence for the user when a bound capped it, else empty
+};
+
+/// What writeVdb with VdbLayout::flat would make.
+FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const VdbWriteOptions& options);
 
 /// Writes the samples (layout: docs/vdb_layout.md) and frees the store's tiles on the way. Nothing stands at
 /// `path` until the file is whole. Throws IoError (not writable, disk full), InputError (a unit that OpenVDB
@@ -73,7 +86,8 @@ struct VdbFile {
     std::string version, sourceFile, algorithm, criterion;
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
-    bool halfFloat = false;  ///< values were rounded to half floats
+    bool halfFloat = false;            ///< values were rounded to half floats
+    std::optional<Box3d> boundsWorld;  ///< the box that was asked for: no error was measured outside it
     float background = 0;
     int flatLevel = 0;  ///< flat: the level whose spacing the grids have
     std::vector<std::string> gridNames;

@@ -111,6 +111,22 @@ BrickTree decodeTree(const std::string& text) {
     }
 }
 
+std::string encodeBounds(const Box3d& box) {
+    return Json{box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}.dump();
+}
+
+Box3d decodeBounds(const std::string& text) {
+    const Json json = Json::parse(text);
+    if (json.size() != 6) damaged("tessera_bounds isn't six numbers");
+    Box3d box;
+    for (int axis = 0; axis < 3; ++axis) {
+        box.min[axis] = json.at(std::size_t(axis)).get<double>();
+        box.max[axis] = json.at(std::size_t(axis) + 3).get<double>();
+        if (!(box.min[axis] < box.max[axis])) damaged("tessera_bounds is no box");
+    }
+    return box;
+}
+
 std::string encodeFields(const std::vector<OutputField>& fields) {
     Json json = Json::array();
     for (const OutputField& field : fields) {
@@ -174,8 +190,11 @@ void checkOutputFields(const std::vector<OutputField>& fields) {
         if (grid.name.find('\x1e') != std::string::npos)
             throw InputError("a grid's name can't hold the character 0x1e");
         if (!names.insert(grid.name).second) {
+            std::string source = grid.field;
+            for (const OutputField& field : fields)
+                if (field.name == grid.field && !field.sourceName.empty()) source = field.sourceName;
             throw InputError("two grids of the output would be named '" + grid.name +
-                             "': rename a field with --field " + grid.field + "=newname");
+                             "': rename a field with --field " + source + "=newname");
         }
     }
 }
@@ -219,6 +238,7 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_precision"] = metadata.halfFloat ? "half" : "float";
     entries["tessera_background"] = exactText(double(metadata.background));
     entries["tessera_flat_level"] = std::to_string(metadata.flatLevel);
+    if (metadata.boundsWorld) entries["tessera_bounds"] = encodeBounds(*metadata.boundsWorld);
     entries["tessera_fields"] = encodeFields(metadata.fields);
     entries["tessera_report"] = reportToJson(metadata.report);
     entries["tessera_bricks"] = encodeTree(metadata.tree);
@@ -248,6 +268,8 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     try {
         metadata.fields = decodeFields(entry(entries, "tessera_fields"));
         metadata.tree = decodeTree(entry(entries, "tessera_bricks"));
+        if (const auto bounds = entries.find("tessera_bounds"); bounds != entries.end())
+            metadata.boundsWorld = decodeBounds(bounds->second);
     } catch (const Json::exception& error) {
         damaged(error.what());
     }

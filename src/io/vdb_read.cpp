@@ -56,7 +56,7 @@ bool checkBytes(const std::string& path) {
 }
 
 // Address space in use now, in bytes.
-std::uint64_t addressSpaceBytes() {
+[[maybe_unused]] std::uint64_t addressSpaceBytes() {
     std::ifstream status("/proc/self/statm");
     std::uint64_t pages = 0;
     status >> pages;

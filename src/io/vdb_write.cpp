@@ -1,10 +1,13 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/openvdb.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <mutex>
 #include <ostream>
 
@@ -25,6 +28,9 @@ static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints,
 
 constexpr std::size_t kUuidOffset = 21;  // after magic, format, library's two version numbers and a flag
 constexpr std::size_t kUuidBytes = 36;
+
+constexpr std::int64_t kDefaultFlatPoints = std::int64_t(1) << 26;  // seconds of work
+constexpr std::int64_t kMostFlatPoints = std::int64_t(1) << 31;
 
 openvdb::Coord coord(const Vec3i& p) {
     return openvdb::Coord(p.x, p.y, p.z);
@@ -409,11 +415,19 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.upAxis = options.upAxis;
     metadata.halfFloat = options.halfFloat;
     metadata.background = options.background;
+    metadata.boundsWorld = options.boundsWorld;
     metadata.flatLevel = written.flatLevel;
     return metadata;
 }
 
-void chooseFrame(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteResult& result) {
+std::int64_t quarterOfMemory() {
+    const long pages = sysconf(_SC_PHYS_PAGES), pageBytes = sysconf(_SC_PAGE_SIZE);
+    return pages > 0 && pageBytes > 0 ? std::int64_t(pages) * pageBytes / 4
+                                      : std::numeric_limits<std::int64_t>::max();
+}
+
+void chooseFrame(const BrickTree& tree, int channels, const VdbWriteOptions& options,
+                 VdbWriteResult& result) {
     result.unitScale = chooseUnitScale(tree.spacingWorld(0), options.unitScale);
     if (options.unitScale == 0 && result.unitScale != 1) {
         result.notes.push_back("the finest voxel, " + exactText(tree.spacingWorld(0)) +
@@ -422,25 +436,49 @@ void chooseFrame(const BrickTree& tree, const VdbWriteOptions& options, VdbWrite
                                " of the mesh's (see tessera_unit_scale in the file)");
     }
     if (options.layout == VdbLayout::levels) return;
-    const std::int64_t limit = options.maxFlatVoxels > 0 ? options.maxFlatVoxels : std::int64_t(1) << 31;
-    result.flatLevel = chooseFlatLevel(tree, limit);
-    if (result.flatLevel > 0) {
-        result.notes.push_back("the flat grid has spacing " + exactText(tree.spacingWorld(result.flatLevel)) +
-                               " instead of " + exactText(tree.spacingWorld(0)) +
-                               ": at the finest it would hold " +
-                               std::to_string(std::int64_t(flatPointCount(tree, 0))) +
-                               " voxels, the limit is " + std::to_string(limit));
-    }
+    FlatGridPlan plan = planFlatGrid(tree, channels, options);
+    result.flatLevel = plan.level;
+    if (!plan.note.empty()) result.notes.push_back(std::move(plan.note));
 }
 
 }  // namespace
+
+FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const VdbWriteOptions& options) {
+    const double pointBytes = 4.0 * channels + 0.125;
+    const std::int64_t maxBytes = options.maxFlatBytes > 0 ? options.maxFlatBytes : quarterOfMemory();
+    const std::int64_t byMemory = std::int64_t(double(maxBytes) / pointBytes);
+    const std::int64_t byCount =
+        options.maxFlatVoxels > 0 ? std::min(options.maxFlatVoxels, kMostFlatPoints) : kDefaultFlatPoints;
+    const std::int64_t limit = std::min(byCount, byMemory);
+    FlatGridPlan plan;
+    plan.level = chooseFlatLevel(tree, limit);
+    const double points = flatPointCount(tree, plan.level);
+    plan.points = std::int64_t(std::ceil(points));
+    plan.bytes = std::int64_t(std::ceil(points * pointBytes));
+    if (plan.level == 0) return plan;
+    // Where memory decides, more voxels alone would change nothing.
+    std::string more = "give a larger --max-voxels for a finer grid";
+    if (byCount >= kMostFlatPoints && byMemory >= kMostFlatPoints) {
+        more = "no flat grid can hold more; --layout levels keeps every level";
+    } else if (byMemory < byCount) {
+        more = "the memory allowed for it decides: give a larger --max-memory";
+        if (options.maxFlatVoxels == 0) more += " and --max-voxels";
+        more += " for a finer grid";
+    }
+    plan.note = "the flat grid has spacing " + exactText(tree.spacingWorld(plan.level)) + " (level " +
+                std::to_string(plan.level) + ") instead of " + exactText(tree.spacingWorld(0)) +
+                ": at the finest it would hold " +
+                std::to_string(std::int64_t(std::min(flatPointCount(tree, 0), 9e18))) +
+                " voxels, the limit is " + std::to_string(limit) + "; " + more;
+    return plan;
+}
 
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
                         const ExtensionPoints* extension, const Reconstruction* reconstruction,
                         const VdbWriteOptions& options, const Execution& execution) {
     checkOutputFields(fields);
     VdbWriteResult written;
-    chooseFrame(result.tree, options, written);
+    chooseFrame(result.tree, result.store.channels(), options, written);
     AtomicFile file(path);
     openvdb::initialize();
     const std::vector<GridPlan> plans = planGrids(fields);

@@ -5,6 +5,7 @@
 #include <vtkOutputWindow.h>
 #include <vtkSmartPointer.h>
 
+#include <algorithm>
 #include <cctype>
 
 namespace tessera {
@@ -13,14 +14,33 @@ namespace {
 
 std::mutex captureMutex;
 
+/// Removes every " (0x1234)": addresses differ from run to run and tell a user nothing.
+void dropPointers(std::string& message) {
+    for (std::size_t begin; (begin = message.find("(0x")) != std::string::npos;) {
+        const std::size_t end = message.find(')', begin);
+        if (end == std::string::npos) break;
+        if (begin > 0 && message[begin - 1] == ' ') --begin;
+        message.erase(begin, end + 1 - begin);
+    }
+}
+
 /// "ERROR: In reader.cxx, line 5\nvtkReader (0x1234): Text.\n\n" -> "Text."
 std::string messageText(const char* text) {
     std::string message = text ? text : "";
+    // A generic message has no object: "Generic Warning: In reader.cxx, line 5\nText.\n"
+    const std::size_t source = message.find(": In ");
+    const std::size_t sourceEnd = message.find('\n');
+    if (source < sourceEnd && sourceEnd != std::string::npos &&
+        message.substr(source, sourceEnd - source).find(", line ") != std::string::npos)
+        message.erase(0, sourceEnd + 1);
     const std::size_t object = message.find("): ");
-    if (object != std::string::npos) message.erase(0, object + 3);
+    if (object < message.find('\n')) message.erase(0, object + 3);
+    // What follows is the dump of an object's members.
+    message.erase(std::min(message.find("Debug: O"), message.size()));
     for (char& c : message)
         if (std::isspace(static_cast<unsigned char>(c))) c = ' ';
-    while (!message.empty() && message.back() == ' ') message.pop_back();
+    dropPointers(message);
+    while (!message.empty() && (message.back() == ' ' || message.back() == ':')) message.pop_back();
     return message;
 }
 

@@ -9,9 +9,8 @@
 
 namespace tessera {
 
-namespace {
-
 int exactVolumeSign(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
+    if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
     mpq_class u[3], v[3], w[3];
     for (int k = 0; k < 3; ++k) {
         const mpq_class origin(a[k]);
@@ -22,29 +21,6 @@ int exactVolumeSign(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d&
     const mpq_class volume = w[0] * (u[1] * v[2] - u[2] * v[1]) + w[1] * (u[2] * v[0] - u[0] * v[2]) +
                              w[2] * (u[0] * v[1] - u[1] * v[0]);
     return sgn(volume);
-}
-
-}  // namespace
-
-int volumeSign(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
-    const Vec3d u = b - a, v = c - a, w = d - a;
-    const double yz = u.y * v.z, zy = u.z * v.y;
-    const double zx = u.z * v.x, xz = u.x * v.z;
-    const double xy = u.x * v.y, yx = u.y * v.x;
-    const double volume = w.x * (yz - zy) + w.y * (zx - xz) + w.z * (xy - yx);
-    const double wx = std::fabs(w.x), wy = std::fabs(w.y), wz = std::fabs(w.z);
-    const double sum = wx * (std::fabs(yz) + std::fabs(zy)) + wy * (std::fabs(zx) + std::fabs(xz)) +
-                       wz * (std::fabs(xy) + std::fabs(yx));
-    // Each of the six monomials passes at most 8 roundings (3 differences, 2 products, 3 sums), and so does
-    // `sum`, so the error is at most
-    // ((1 + e)^8 - 1) / (1 - e)^8 < 9 e times `sum`, e = 2^-53; 10 e leaves room for the rounding of the
-    // bound itself. A product that underflows loses at most 2^-1075: the second term. Overflow makes the
-    // comparison false (infinity or NaN) and ends in the exact path.
-    const double bound = 10 * 0x1p-53 * sum + 0x1p-1060 * (wx + wy + wz + 1);
-    if (volume > bound) return 1;
-    if (volume < -bound) return -1;
-    if (a == b || a == c || a == d || b == c || b == d || c == d) return 0;
-    return exactVolumeSign(a, b, c, d);
 }
 
 double signedVolume(const TetMesh& mesh, std::int64_t element) {

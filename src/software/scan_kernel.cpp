@@ -35,6 +35,8 @@ inline constexpr double kAxisGain = 4.0;
 /// float.
 inline constexpr float kDenormalSteps = 0x1p-96f;
 inline constexpr double kMostFloatSteps = 0x1p22;
+/// Larger elements would overflow the offsets, which are computed in double.
+inline constexpr double kLargestElement = 0x1p28;
 /// A scanline's first or last voxel may lie this far outside the element, in voxels.
 inline constexpr double kEndTolerance = 0x1p-26;
 /// Stands for the reciprocal of zero: the face is parallel to the scan axis and bounds it nowhere or
@@ -199,7 +201,8 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     const V fromPlace = hn::Mul(hn::Mul(hn::Set(d, 128.0), steepest), hn::Add(longest, hn::Set(d, 2.0)));
     const V dilation = hn::Mul(hn::Set(d, kUnit), hn::Add(fromDet, fromPlace));
     const V spread = hn::Mul(dilation, hn::Add(hn::Add(size0, size1), size2));
-    const auto valued = hn::Le(dilation, hn::Set(d, kLargestSlack));
+    const auto valued =
+        hn::And(hn::Le(dilation, hn::Set(d, kLargestSlack)), hn::Le(longest, hn::Set(d, kLargestElement)));
     const auto easy = hn::And(valued, hn::Le(spread, hn::Set(d, kLargestSlackTimesSize)));
     hn::Store(hn::IfThenElse(easy, hn::Set(d, kEasy), hn::IfThenElseZero(valued, hn::Set(d, kDoubtful))), d,
               &batch.grade[lane]);
@@ -581,8 +584,9 @@ void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scra
               {}};
     walk.simple = axis == 0 && scratch.channels.size() == 1 && scratch.channels[0].finite[lane] &&
                   !scratch.channels[0].inDouble[lane];
-    for (int a = 0; a < 3; ++a)
+    for (int a = 0; a < 3; ++a) {
         walk.origin += (std::int64_t(batch.base[a][lane]) - output.blockBox.min[a]) * output.stride[a];
+    }
     switch (lower) {
         case 0:
             walkRows<0>(walk, order, from, to);

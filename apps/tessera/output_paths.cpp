@@ -1,0 +1,56 @@
+#include "output_paths.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <map>
+
+#include "base/error.h"
+
+namespace tessera {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The same for two paths exactly when they are the same file: device and inode where there is a file, else
+/// the name with its links resolved. A series may have thousands of steps, so keys, not pairs, are compared.
+std::string fileKey(const std::string& path) {
+    struct stat status {};
+    if (::stat(path.c_str(), &status) == 0) return fmt::format("{}:{}", status.st_dev, status.st_ino);
+    std::error_code failure;
+    fs::path name = fs::absolute(path, failure);
+    // A link to nothing counts as what it points to.
+    for (int links = 0; links < 40 && fs::is_symlink(fs::symlink_status(name, failure)); ++links)
+        name = name.parent_path() / fs::read_symlink(name, failure);
+    const fs::path resolved = fs::weakly_canonical(name, failure);
+    return (failure ? name.lexically_normal() : resolved).string();
+}
+
+/// TetGen's meshes are two files that are read together.
+std::string companion(const std::string& path) {
+    fs::path other(path);
+    if (other.extension() == ".node") return other.replace_extension(".ele").string();
+    if (other.extension() == ".ele") return other.replace_extension(".node").string();
+    return {};
+}
+
+}  // namespace
+
+void checkOutputPaths(const std::vector<std::string>& inputs, const std::vector<OutputPath>& outputs) {
+    std::map<std::string, std::string> used;  // what each file is used for
+    for (const std::string& input : inputs)
+        for (const std::string& path : {input, companion(input)})
+            if (!path.empty()) used.emplace(fileKey(path), "the input " + path);
+    for (const OutputPath& output : outputs) {
+        if (output.path.empty() || (output.option == "--json" && output.path == "-")) continue;
+        const auto [before, isNew] =
+            used.emplace(fileKey(output.path), fmt::format("the {} file {}", output.option, output.path));
+        if (!isNew)
+            throw InputError(
+                fmt::format("{}: {} would replace {}", output.path, output.option, before->second));
+    }
+}
+
+}  // namespace tessera
