@@ -13,6 +13,7 @@
 #include "io/read_mesh.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
+#include "registry/registry.h"
 #include "report_text.h"
 
 namespace tessera {
@@ -153,7 +154,8 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
     command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
     command.add_option("--range", a.range,
                        "values a,b at the ends of the colour map (default: those of the slice)");
-    command.add_option("--mesh", a.mesh, "the mesh file: voxel cells that its surface cuts are drawn whole");
+    command.add_option("--mesh", a.mesh,
+                       "the mesh file: draws up to the mesh's surface instead of whole voxels");
     command.add_option("--pixels", a.pixels, "along the longer edge")
         ->check(CLI::Range(16, 8192))
         ->capture_default_str();
@@ -174,8 +176,15 @@ int runPicture(const PictureArguments& arguments) {
     if (file.layout != VdbLayout::levels)
         throw InputError(fmt::format("{}: only files of layout levels can be drawn", arguments.input));
     const OutputField& field = chooseField(file, arguments.field);
-    const SliceOptions slice = sliceOptions(arguments, file);
+    SliceOptions slice = sliceOptions(arguments, file);
     const Outside outside = readOutside(arguments, file, session.execution);
+    if (!arguments.mesh.empty()) {
+        // The mesh's own outline, by the cut plane through it.
+        const SliceFrame frame = sliceFrame(file.tree, slice);
+        slice.coverage = resampleBlock(findResampler("software"), outside.mesh, {}, frame.lattice,
+                                       {{0, 0, 0}, {frame.width, frame.height, 1}}, session.execution)
+                             .coverage;
+    }
     const NearestPointIndex nearest(outside.mesh, session.execution.threadCount());
     const Reconstruction reconstruction(outside.mesh, outside.fields, file.tree, file.store, nearest);
     const ScalarImage image = sampleField(file, field, arguments, reconstruction, slice, session.execution);

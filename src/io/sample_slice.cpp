@@ -18,13 +18,6 @@ Box3d boundsOf(const BrickTree& tree) {
     return box;
 }
 
-// The picture's frame: which axes it shows, its lower left corner and the edge of a pixel.
-struct Frame {
-    int right = 0, up = 1;
-    Vec3d corner{0};
-    double pixelWorld = 1;
-};
-
 void markOutlines(ScalarImage& image, const std::vector<std::int64_t>& leafOf) {
     image.outlines.assign(leafOf.size(), 0);
     for (int y = 0; y < image.height; ++y)
@@ -38,25 +31,39 @@ void markOutlines(ScalarImage& image, const std::vector<std::int64_t>& leafOf) {
 
 }  // namespace
 
-ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel,
-                        const SliceOptions& options, const Execution& execution) {
+SliceFrame sliceFrame(const BrickTree& tree, const SliceOptions& options) {
     if (options.axis < 0 || options.axis > 2) throw InputError("a slice's axis is 0, 1 or 2");
     if (options.pixels < 1 || options.pixels > 16384)
         throw InputError("a slice has 1 to 16384 pixels along its longer edge");
     const Box3d bounds = options.boundsWorld.empty() ? boundsOf(tree) : options.boundsWorld;
     if (bounds.empty()) throw InputError("there are no bricks to slice");
-    Frame frame;
-    frame.right = options.axis == 0 ? 1 : 0;
-    frame.up = options.axis == 2 ? 1 : 2;
-    const double width = bounds.size()[frame.right], height = bounds.size()[frame.up];
+    const int right = options.axis == 0 ? 1 : 0, up = options.axis == 2 ? 1 : 2;
+    const double width = bounds.size()[right], height = bounds.size()[up];
     if (!(width > 0 && height > 0)) throw InputError("a slice needs bounds with an area");
-    frame.pixelWorld = std::max(width, height) / options.pixels;
-    frame.corner = bounds.min;
-    frame.corner[options.axis] = options.positionWorld;
+    const double pixelWorld = std::max(width, height) / options.pixels;
+    SliceFrame frame;
+    frame.width = std::clamp(int(std::lround(width / pixelWorld)), 1, options.pixels);
+    frame.height = std::clamp(int(std::lround(height / pixelWorld)), 1, options.pixels);
+    Vec3d corner = bounds.min;
+    corner[right] += 0.5 * pixelWorld;
+    corner[up] += 0.5 * pixelWorld;
+    corner[options.axis] = options.positionWorld;
+    frame.lattice = {corner, Vec3d(0), Vec3d(0), Vec3d(0)};
+    frame.lattice.uWorld[right] = pixelWorld;
+    frame.lattice.vWorld[up] = pixelWorld;
+    frame.lattice.wWorld[options.axis] = pixelWorld;
+    return frame;
+}
 
+ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruction, int channel,
+                        const SliceOptions& options, const Execution& execution) {
+    const SliceFrame frame = sliceFrame(tree, options);
     ScalarImage image;
-    image.width = std::clamp(int(std::lround(width / frame.pixelWorld)), 1, options.pixels);
-    image.height = std::clamp(int(std::lround(height / frame.pixelWorld)), 1, options.pixels);
+    image.width = frame.width;
+    image.height = frame.height;
+    TESSERA_CHECK(options.coverage.empty() ||
+                      options.coverage.size() == std::size_t(frame.width) * std::size_t(frame.height),
+                  "a slice's coverage has one entry a pixel");
     const std::size_t pixels = std::size_t(image.width) * std::size_t(image.height);
     image.values.assign(pixels, 0.0f);
     image.coverage.assign(pixels, 0);
@@ -64,17 +71,19 @@ ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruct
     parallelFor(execution, image.height, [&](std::int64_t row) {
         for (int x = 0; x < image.width; ++x) {
             const std::size_t i = image.offset(x, int(row));
-            Vec3d place = frame.corner;
-            place[frame.right] += (x + 0.5) * frame.pixelWorld;
-            place[frame.up] += (image.height - 1 - double(row) + 0.5) * frame.pixelWorld;
+            const int up = image.height - 1 - int(row);
+            const Vec3d place = frame.lattice.worldFromIndex({double(x), double(up), 0.0});
             const Vec3d index0 = (place - tree.originWorld()) / tree.spacingWorld(0);
             const std::int64_t leaf = tree.findLeafAt(index0);
             leafOf[i] = leaf;
             if (leaf < 0) continue;
             const int level = tree.leaves()[std::size_t(leaf)].level;
             const Vec3d index = index0 * std::ldexp(1.0, -level);
-            const Vec3i nearest(glm::floor(index + 0.5));
-            if (!reconstruction.resolve(level, nearest, channel, {})) continue;
+            const bool inMesh =
+                options.coverage.empty()
+                    ? reconstruction.resolve(level, Vec3i(glm::floor(index + 0.5)), channel, {})
+                    : options.coverage[std::size_t(up) * std::size_t(image.width) + std::size_t(x)] != 0;
+            if (!inMesh) continue;
             image.values[i] = float(reconstruction.interpolate(std::size_t(leaf), index, channel));
             image.coverage[i] = 1;
         }

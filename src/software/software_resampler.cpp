@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kIndexLimit = 1 << 30;
 constexpr int kLargestRegion = 64, kSmallestRegion = 16;
-constexpr int kRegionsPerThread = 8;
+constexpr int kRegionsPerThread = 4;
 /// Blocks in flight may take this much before regions are worked strictly block by block.
 constexpr std::int64_t kReorderLimitBytes = std::int64_t(256) << 20;
 
