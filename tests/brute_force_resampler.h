@@ -20,7 +20,7 @@ class BruteForceResampler : public Resampler {
     double spillBoundVoxels() const override { return 1e-6; }
     double placeBoundVoxels() const override { return 1e-6; }
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
-                                         std::string_view) const override {
+                                         const BindOptions&) const override {
         return std::make_unique<Bound>(mesh, fields);
     }
 

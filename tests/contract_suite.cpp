@@ -237,7 +237,7 @@ std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::
     std::vector<Block> blocks(boxes.size());
     std::vector<int> calls(boxes.size(), 0);
     std::mutex mutex;
-    const auto bound = resampler.bind(mesh, fields, sampling.target);
+    const auto bound = resampler.bind(mesh, fields, {.target = sampling.target});
     EXPECT_EQ(bound->target(), sampling.target.empty() ? resampler.targets().front() : sampling.target);
     bound->resample(lattice, boxes,
                     [&](std::size_t b, const Block& block) {

@@ -83,9 +83,10 @@ TEST_P(ContractOf, RunsTheTargetAskedForAndRefusesOthers) {
     ASSERT_FALSE(targets.empty());
     EXPECT_EQ(std::set<std::string>(targets.begin(), targets.end()).size(), targets.size());
     const TetMesh mesh = boxMesh({});
-    for (const std::string& target : targets) EXPECT_EQ(GetParam()->bind(mesh, {}, target)->target(), target);
+    for (const std::string& target : targets)
+        EXPECT_EQ(GetParam()->bind(mesh, {}, {.target = target})->target(), target);
     EXPECT_EQ(GetParam()->bind(mesh, {})->target(), targets.front());
-    EXPECT_THROW(GetParam()->bind(mesh, {}, "no such target"), InputError);
+    EXPECT_THROW(GetParam()->bind(mesh, {}, {.target = "no such target"}), InputError);
 }
 
 TEST_P(ContractOf, CoversTheClosedBoxExactly) {

@@ -81,8 +81,8 @@ class BoundOracle : public BoundResampler {
 }  // namespace
 
 std::unique_ptr<BoundResampler> OracleResampler::bind(const TetMesh& mesh, std::span<const int> fields,
-                                                      std::string_view target) const {
-    if (!target.empty() && target != "default") throw InputError("the oracle has one target");
+                                                      const BindOptions& options) const {
+    if (!options.target.empty() && options.target != "default") throw InputError("the oracle has one target");
     return std::make_unique<BoundOracle>(mesh, fields);
 }
 

@@ -13,7 +13,7 @@ class OracleResampler : public Resampler {
     double spillBoundVoxels() const override { return 0x1p-12; }
     double placeBoundVoxels() const override { return 0x1p-24; }
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
-                                         std::string_view target) const override;
+                                         const BindOptions& options = {}) const override;
 };
 
 }  // namespace tessera::contract

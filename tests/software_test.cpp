@@ -156,9 +156,9 @@ TEST(SoftwareResampler, aTargetThatIsAskedForRuns) {
     const SoftwareResampler software;
     ASSERT_FALSE(software.targets().empty());
     for (const std::string& target : software.targets())
-        EXPECT_EQ(software.bind(mesh, {}, target)->target(), target);
+        EXPECT_EQ(software.bind(mesh, {}, {.target = target})->target(), target);
     EXPECT_EQ(software.bind(mesh, {}, {})->target(), software.targets().front());
-    EXPECT_THROW(software.bind(mesh, {}, "no such"), InputError);
+    EXPECT_THROW(software.bind(mesh, {}, {.target = "no such"}), InputError);
 }
 
 TEST(Registry, findsByNameAndListsTheNamesOtherwise) {

@@ -2,6 +2,20 @@
 
 namespace tessera {
 
+std::string_view nameOf(SampleFormat format) {
+    switch (format) {
+        case SampleFormat::r32f:
+            return "r32f";
+        case SampleFormat::r16f:
+            return "r16f";
+        case SampleFormat::r16:
+            return "r16";
+        case SampleFormat::r8:
+            return "r8";
+    }
+    return "unknown";
+}
+
 ResampleStatistics& ResampleStatistics::operator+=(const ResampleStatistics& other) {
     elementBlockPairs += other.elementBlockPairs;
     exactElements += other.exactElements;
@@ -10,6 +24,16 @@ ResampleStatistics& ResampleStatistics::operator+=(const ResampleStatistics& oth
     coveredPoints += other.coveredPoints;
     binMs += other.binMs;
     sampleMs += other.sampleMs;
+    elementSlicePairs += other.elementSlicePairs;
+    polygons += other.polygons;
+    vertices += other.vertices;
+    fragments += other.fragments;
+    uploadBytes += other.uploadBytes;
+    readBackBytes += other.readBackBytes;
+    generateMs += other.generateMs;
+    uploadMs += other.uploadMs;
+    renderMs += other.renderMs;
+    readBackMs += other.readBackMs;
     return *this;
 }
 

@@ -15,15 +15,47 @@
 
 namespace tessera {
 
-/// What one call to BoundResampler::resample did. Counts are exact; times are wall milliseconds.
+/// How a resampler keeps a value before it is handed over as a float. The normalised formats divide the
+/// field's range into equal steps; they exist on OpenGL targets.
+enum class SampleFormat { r32f, r16f, r16, r8 };
+/// "r32f", "r16f", "r16", "r8".
+std::string_view nameOf(SampleFormat format);
+
+/// How an OpenGL resampler decides which points an element covers.
+enum class Classification {
+    arithmetic,  ///< by distances computed in the fragment: meets the contract
+    published,   ///< as in the paper (2D alpha textures, Gouraud fill): shows what accuracy costs
+};
+
+/// What BoundResampler runs with.
+struct BindOptions {
+    std::string target;  ///< one of Resampler::targets(); empty: the first
+    SampleFormat format = SampleFormat::r32f;
+    Classification classification = Classification::arithmetic;
+};
+
+/// What one call to BoundResampler::resample did. Counts are exact; times are wall milliseconds, and stages
+/// may overlap.
 struct ResampleStatistics {
-    std::int64_t elementBlockPairs = 0;  ///< elements that may touch a block, summed over blocks
+    std::int64_t elementBlockPairs = 0;  ///< elements that may touch a block or region, summed over them
     std::int64_t exactElements = 0;      ///< of these, pairs that needed more than double precision
-    std::int64_t scanlines = 0;          ///< scanlines (or slice polygons) visited
+    std::int64_t scanlines = 0;          ///< scanlines visited
     std::int64_t contested = 0;          ///< points that more than one element covered
     std::int64_t coveredPoints = 0;
     double binMs = 0;     ///< element lists
     double sampleMs = 0;  ///< everything after, the sink included
+
+    // Of the OpenGL resamplers only.
+    std::int64_t elementSlicePairs = 0;  ///< slices that an element reaches, summed over elements
+    std::int64_t polygons = 0;           ///< substitute or slice polygons, before they are grown
+    std::int64_t vertices = 0;           ///< sent to the device
+    std::int64_t fragments = 0;          ///< shaded, as the device counts them
+    std::int64_t uploadBytes = 0;
+    std::int64_t readBackBytes = 0;
+    double generateMs = 0;  ///< polygons or instances, on the processor
+    double uploadMs = 0;
+    double renderMs = 0;  ///< on the device, by timer queries
+    double readBackMs = 0;
 
     ResampleStatistics& operator+=(const ResampleStatistics& other);
 };
@@ -57,18 +89,22 @@ class Resampler {
     virtual std::string_view description() const = 0;  ///< one line
     /// Empty when this machine can run it, else the reason why not.
     virtual std::string unavailableReason() const { return {}; }
-    /// Code paths this processor or driver offers, the default first, e.g. "AVX3", "AVX2", "SSE4"; all give
-    /// the same bits.
+    /// Code paths this processor or driver offers, the default first: "AVX3", "AVX2", "SSE4", or
+    /// "egl-device", "egl-surfaceless", "osmesa".
     virtual std::vector<std::string> targets() const { return {"default"}; }
+    /// All targets give the same bits. Not so where each is a device of its own.
+    virtual bool targetsAgree() const { return true; }
+    /// Formats it can sample in, the exact one first.
+    virtual std::vector<SampleFormat> formats() const { return {SampleFormat::r32f}; }
     /// Largest true distance from the mesh, in voxels, at which a point may be covered (contract clause 2).
     virtual double spillBoundVoxels() const = 0;
     /// Distance in voxels within which the interpolated place may differ from the lattice point (contract
     /// clause 4).
     virtual double placeBoundVoxels() const = 0;
     /// @param fields indices into mesh.fields; channels of the blocks are their components, in this order.
-    /// @param target one of targets(), or empty for the default.
+    /// Throws InputError for options that it doesn't have.
     virtual std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
-                                                 std::string_view target = {}) const = 0;
+                                                 const BindOptions& options = {}) const = 0;
 };
 
 /// Convenience for single use: samples one box into one block.

@@ -251,12 +251,16 @@ double SoftwareResampler::placeBoundVoxels() const {
 }
 
 std::unique_ptr<BoundResampler> SoftwareResampler::bind(const TetMesh& mesh, std::span<const int> fields,
-                                                        std::string_view target) const {
+                                                        const BindOptions& options) const {
+    if (options.format != SampleFormat::r32f)
+        throw InputError("the software resampler samples in r32f only, not in " +
+                         std::string(nameOf(options.format)));
+    if (options.classification != Classification::arithmetic)
+        throw InputError("the software resampler classifies by arithmetic only");
     for (const ScanTarget& candidate : scanTargets())
-        if (target.empty() || candidate.name == target)
+        if (options.target.empty() || candidate.name == options.target)
             return std::make_unique<BoundSoftware>(mesh, fields, candidate);
-    throw InputError("the software resampler has no target named " + std::string(target) +
-                     " on this processor");
+    throw InputError("the software resampler has no target named " + options.target + " on this processor");
 }
 
 }  // namespace tessera

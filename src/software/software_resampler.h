@@ -15,7 +15,7 @@ class SoftwareResampler : public Resampler {
     double spillBoundVoxels() const override;
     double placeBoundVoxels() const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
-                                         std::string_view target) const override;
+                                         const BindOptions& options = {}) const override;
 };
 
 }  // namespace tessera
