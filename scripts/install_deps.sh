@@ -4,8 +4,9 @@ set -euo pipefail
 
 packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
-  libvtk9-dev libopenvdb-dev libopenvdb-tools libopenexr-dev libtbb-dev libblosc-dev libpng-dev zlib1g-dev
+  libvtk9-dev libopenvdb-dev libopenvdb-tools libopenexr-dev openexr libtbb-dev libblosc-dev libpng-dev zlib1g-dev
   libglm-dev libgmp-dev libhwy-dev libcli11-dev nlohmann-json3-dev libfmt-dev
+  libgl-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6
   libgtest-dev libbenchmark-dev clang-format tetgen
   python3 python3-vtk9 python3-openvdb python3-numpy
 )

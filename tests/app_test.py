@@ -168,7 +168,8 @@ class BadInput(AppTest):
             ["--layout", "round"], ["--extend", "-1"], ["--extend", "1000"], ["--background", "nan"], ["--unit-scale", "-1"], ["--unit-scale", "0"], ["--unit-scale", "1e31"],
             ["--unit-scale", "1e-31"], ["--background", "1e39"], ["--time-step", "-1"],
             ["--up-axis", "x"], ["--threads", "-1"], ["--threads", "many"], ["--field", ""], ["--field", "f,f"], ["--field", "=x"],
-            ["--algorithm", "magic"], ["--time-step", "-3"], ["--error-field", "f"], ["--nonsense"],
+            ["--algorithm", "magic"], ["--sample-format", "r8"], ["--sample-format", "r64"], ["--gl", "osmesa"], ["--gl", "glx"], ["--classification", "published"], ["--classification", "x"],
+            ["--time-step", "-3"], ["--error-field", "f"], ["--nonsense"],
         ):  # fmt: skip
             with self.subTest(options=options):
                 # An option whose text begins with a dash must not be taken for another option, so it is joined with '='.
@@ -404,6 +405,14 @@ class Reports(AppTest):
         self.assertTrue(any(grid["name"].startswith("p_level_") for grid in info["grids"]))
         self.assertEqual(self.report("info", self.stokes)["mesh"]["nodes"], written["mesh"]["nodes"])
 
+    def test_auto_writes_what_it_chose_into_the_file(self):
+        report = self.report("resample", self.cube, "-o", "out.vdb", "--algorithm", "auto", "--refine", "uniform", "--resolution", "20")
+        self.assertIn("auto chose " + report["algorithm"], report["algorithm_reason"])
+        self.assertEqual(report["sample_format"], "r32f")
+        self.assertNotEqual(report["target"], "")
+        self.assertEqual(self.report("info", "out.vdb")["algorithm"], report["algorithm"])
+        self.assertTrue(self.report("verify", self.cube, "out.vdb")["holds"])
+
     def test_verify_confirms_the_file(self):
         for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"]):
             self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", *options)
@@ -478,6 +487,148 @@ class Reports(AppTest):
         self.reject(2, "speed pressure", "picture", "out.vdb", "-o", "other.png", "--field", "speed")
 
 
+class Slices(AppTest):
+    """tessera slice."""
+
+    def slice(self, mesh, *options):
+        return self.report("slice", mesh, *options)
+
+    def reject_slice(self, words, *options, output="cut.exr", mesh=None, code=2):
+        return self.reject(code, words, "slice", mesh or self.cube, "-o", output, *options)
+
+    def test_report_tells_the_plane_the_pixels_and_the_elements(self):
+        report = self.slice(self.cube, "-o", "cut.exr", "--normal", "0,0,2", "--resolution", "40")
+        self.assertEqual(report["plane"], {"origin": [0.5, 0.5, 0.5], "normal": [0, 0, 1]})
+        image = report["image"]
+        self.assertEqual((image["width"], image["height"], image["covered_pixels"]), (40, 40, 1600))
+        self.assertEqual(image["spacing"], 1 / 40)
+        self.assertEqual((image["u"], image["v"]), ([1 / 40, 0, 0], [0, 1 / 40, 0]))
+        for got, expected in zip(image["origin"], (1 / 80, 1 / 80, 0.5)):
+            self.assertAlmostEqual(got, expected, places=15)
+        # f = x: the outermost pixels' centres are half a pixel inside.
+        self.assertEqual(image["channels"][0]["name"], "f")
+        for got, expected in zip(image["channels"][0]["range"], (1 / 80, 79 / 80)):
+            self.assertAlmostEqual(got, expected, places=6)
+        self.assertEqual(report["elements"], {"total": 6, "boxes": 6, "touched": 6, "hit": 6})
+        self.assertEqual(set(report["stages"]), {"read", "index", "query", "resample", "write"})
+        self.assertEqual((report["algorithm"], report["sample_format"]), ("software", "r32f"))
+        self.assertTrue((self.folder / "cut.exr").read_bytes().startswith(b"\x76\x2f\x31\x01"))
+
+    def test_header_holds_every_channel_and_attribute(self):
+        self.succeed("slice", self.stokes, "-o", "cut.exr", "--normal", "1,1,1", "--resolution", "100", "--quiet")
+        header = (self.folder / "cut.exr").read_bytes()[:4000]
+        for name in (b"pressure", b"velocity.x", b"velocity.y", b"velocity.z", b"coverage"):
+            self.assertIn(b"\0" + name + b"\0", header)
+        for name in (b"Origin\0v3d", b"U\0v3d", b"V\0v3d", b"Normal\0v3d", b"Spacing\0double", b"Source\0string", b"Algorithm\0string", b"Version\0string"):
+            self.assertIn(b"tessera" + name + b"\0", header)
+        for text in (b"stokes_p1.vtu", b"software"):
+            self.assertIn(text, header)
+
+    def test_header_is_read_by_openexrs_own_program(self):
+        program = shutil.which("exrheader")
+        if not program:
+            self.skipTest("exrheader is not installed")
+        self.succeed("slice", self.stokes, "-o", "cut.exr", "--normal", "1,1,1", "--resolution", "100", "--quiet")
+        text = subprocess.run([program, "cut.exr"], capture_output=True, text=True, cwd=self.folder, check=True).stdout
+        for word in ("velocity.x", "32-bit floating-point", "tesseraSpacing", "coverage", "stokes_p1.vtu"):
+            self.assertIn(word, text)
+
+    def test_png_shows_one_field(self):
+        report = self.slice(self.stokes, "-o", "cut.PNG", "--normal", "0,1,0", "--field", "velocity", "--resolution", "100")
+        self.assertTrue((self.folder / "cut.PNG").read_bytes().startswith(b"\x89PNG\r\n"))
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["|velocity|"])
+        report = self.slice(self.stokes, "-o", "cut.png", "--field", "velocity", "--component", "2", "--range", "0,1", "--resolution", "100")
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["velocity.z"])
+
+    def test_size_shows_a_part(self):
+        options = ("--normal", "0,0,1", "--origin", "0.25,0.5,0.5", "--size", "0.5,0.25", "--resolution", "64")
+        image = self.slice(self.cube, "-o", "cut.exr", *options)["image"]
+        self.assertEqual((image["width"], image["height"], image["covered_pixels"]), (64, 32, 64 * 32))
+        beyond = self.slice(self.cube, "-o", "cut.exr", "--size", "2", "--resolution", "64")["image"]
+        self.assertEqual((beyond["width"], beyond["height"], beyond["covered_pixels"]), (64, 64, 32 * 32))
+
+    def test_negative_numbers_need_no_equals_sign(self):
+        report = self.slice(self.cube, "-o", "cut.exr", "--normal", "-1,0,0", "--up", "-0,-1,0", "--resolution", "20")
+        self.assertEqual(report["plane"]["normal"], [-1, 0, 0])
+        self.assertEqual(report["image"]["v"], [0, -1 / 20, 0])
+
+    def test_any_number_of_threads_gives_the_same_file(self):
+        for name in ("cut.exr", "cut.png"):
+            files = set()
+            for threads in (1, 2, 5):
+                self.succeed("slice", self.stokes, "-o", name, "--normal", "1,2,3", "--resolution", "300", "--quiet", "--threads", threads)
+                files.add((self.folder / name).read_bytes())
+            self.assertEqual(len(files), 1)
+
+    def test_quiet_prints_nothing(self):
+        self.assertEqual(self.succeed("slice", self.cube, "-o", "cut.exr", "--quiet"), "")
+        self.assertRegex(self.succeed("slice", self.cube, "-o", "cut.exr"), r"cut through 6 elements: 6 touched \(100.0 %\), 6 hit")
+
+    def test_mesh_without_fields_gives_its_coverage(self):
+        self.write("bare.vtu", vtu_text(fields={}))
+        self.assertEqual(self.slice("bare.vtu", "-o", "cut.exr")["image"]["channels"], [])
+        self.reject_slice("no field", mesh="bare.vtu", output="cut.png")
+
+    def test_field_named_coverage_gets_another_name(self):
+        self.write("clash.vtu", vtu_text(fields={"coverage": range(8)}))
+        report = self.slice("clash.vtu", "-o", "cut.exr")
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["coverage_"])
+
+    def test_bad_input_says_what_is_wrong(self):
+        self.reject_slice("normal zero", "--normal", "0,0,0")
+        self.reject_slice("--normal", "--normal", "0,nan,1")
+        self.reject_slice("--normal", "--normal", "0,1")
+        self.reject_slice("--origin", "--origin", "inf,0,0")
+        self.reject_slice("upward", "--up", "0,0,1")
+        self.reject_slice("misses the mesh", "--origin", "0,0,5")
+        self.reject_slice("misses the mesh", "--origin", "7,7,0.5", "--size", "1")
+        self.reject_slice("point", "--origin", "0,0,0", "--normal", "1,1,1")
+        self.reject_slice("--size", "--size", "1,2,3")
+        self.reject_slice("size above", "--size", "0")
+        self.reject_slice("--resolution", "--resolution", "0")
+        self.reject_slice("--resolution 16384", "--resolution", "20000")
+        self.reject_slice(".exr .png", output="cut.jpg")
+        self.reject_slice(".exr .png", output="cut")
+        self.reject_slice("speed", "--field", "speed")
+        self.reject_slice("magic software", "--algorithm", "magic")
+        self.reject_slice("software r32f r8", "--sample-format", "r8")
+        self.reject_slice("osmesa", "--gl", "osmesa", "--algorithm", "software")
+        self.reject_slice("--gl", "--gl", "glx")
+        self.reject_slice("component", "--component", "0")
+        self.reject_slice("--component", "--component", "3", output="cut.png")
+        self.reject_slice("a < b", "--range", "1,0", output="cut.png")
+        self.reject_slice("one field", "--field", "f,g", output="cut.png")
+        self.reject_slice("nothing.vtu", mesh="nothing.vtu")
+        self.reject_slice("nowhere/cut.exr", output="nowhere/cut.exr", code=1)
+        self.reject(2, "would replace", "slice", self.cube, "-o", "cut.exr", "--json", "cut.exr")
+
+    def test_pictures_too_large_for_memory_say_what_fits(self):
+        fields = {f"f{i}": range(8) for i in range(8)}
+        self.write("many.vtu", vtu_text(fields=fields))
+        self.assertRegex(self.reject_slice("--resolution", "--resolution", "16384", mesh="many.vtu"), r"\d+ would fit")
+
+    def test_disk_full_leaves_nothing(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+        for name in ("cut.exr", "cut.png"):
+            self.reject(1, name, "slice", self.stokes, "-o", name, "--quiet", "--normal", "1,1,1", preexec_fn=limit)
+
+    def test_auto_says_what_it_chose(self):
+        report = self.slice(self.cube, "-o", "cut.exr", "--algorithm", "auto")
+        self.assertIn(report["algorithm"], report["algorithm_reason"])
+        self.assertNotEqual(report["algorithm"], "auto")
+        self.assertIn("auto chose", self.succeed("slice", self.cube, "-o", "cut.exr", "--algorithm", "auto"))
+
+    def test_values_that_are_not_finite_are_left_out_of_the_range(self):
+        # Every element of the cube has node 0.
+        self.write("nan.vtu", vtu_text(fields={"f": ["nan", *range(7)], "g": range(8)}))
+        channels = {c["name"]: c["range"] for c in self.slice("nan.vtu", "-o", "cut.exr")["image"]["channels"]}
+        self.assertIsNone(channels["f"])
+        self.assertEqual(len(channels["g"]), 2)
+        self.reject_slice("finite", "--field", "f", mesh="nan.vtu", output="cut.png")
+
+
 class Series(AppTest):
     def setUp(self):
         super().setUp()
@@ -504,9 +655,79 @@ class Series(AppTest):
                 self.assertEqual(lattices[0], lattices[2])
 
 
+class Compare(AppTest):
+    def test_two_code_paths_agree(self):
+        text = self.succeed("compare", self.stokes, "--algorithms", "software,software", "--resolution", "40", "--runs", "2")
+        self.assertIn("the algorithms agree", text)
+        report = self.report("compare", self.stokes, "--algorithms", "software,software", "--resolution", "40", "--field", "pressure")
+        self.assertTrue(report["agrees"])
+        mesh = report["meshes"][0]
+        self.assertEqual(max(mesh["lattice"]["points"]), 40)
+        first, second = mesh["algorithms"]
+        self.assertEqual(first["check"], second["check"])
+        self.assertEqual((first["check"]["holes"], first["check"]["spills"], first["check"]["wrong_values"]), (0, 0, 0))
+        against = mesh["against_first"][0]
+        self.assertEqual(against["covered_by_both"], first["check"]["covered"])
+        self.assertEqual((against["only_first"], against["only_this"], against["away_from_boundary"]), (0, 0, 0))
+        self.assertEqual([f["field"] for f in against["fields"]], ["pressure"])
+        self.assertEqual(against["fields"][0]["max"], 0)
+
+    def test_every_algorithm_here_agrees(self):
+        report = self.report("compare", self.stokes, "--resolution", "24", "--runs", "1")
+        self.assertTrue(report["agrees"])
+        ran = [a["label"] for a in report["meshes"][0]["algorithms"]]
+        self.assertEqual(ran[0], "software")
+        self.assertEqual(len(ran) + len(report["absent"]), len(set(ran)) + len(report["absent"]))
+
+    def test_the_grid_covers_the_cube(self):
+        report = self.report("compare", self.cube, "--algorithms", "software", "--spacing", "0.125")
+        self.assertEqual(report["meshes"][0]["lattice"]["points"], [9, 9, 9])
+        self.assertEqual(report["meshes"][0]["algorithms"][0]["check"]["covered"], 729)
+
+    def test_markdown_has_a_row_for_each_mesh_and_algorithm(self):
+        text = self.succeed("compare", self.cube, self.stokes, "--algorithms", "software,software", "--resolution", "12", "--markdown")
+        lines = text.splitlines()
+        self.assertEqual(len(lines), 2 + 2 * 2)
+        self.assertEqual({line.count("|") for line in lines}, {lines[0].count("|")})
+        self.assertIn("cube.vtu", lines[2])
+
+    def test_bad_usage(self):
+        self.reject(2, "magic software", "compare", self.cube, "--algorithms", "magic")
+        self.reject(2, "software nowhere", "compare", self.cube, "--algorithms", "software:nowhere")
+        self.reject(2, "--algorithms", "compare", self.cube, "--algorithms", "software,,software")
+        self.reject(2, "", "compare", self.cube, "--resolution", "1")
+        self.reject(2, "", "compare", self.cube, "--resolution", "9", "--spacing", "0.1")
+        self.reject(2, "", "compare", self.cube, "--spacing", "0")
+        self.reject(2, "spacing", "compare", self.cube, "--spacing", "1e-9")
+        self.reject(2, "", "compare", self.cube, "--runs", "0")
+        self.reject(2, "speed", "compare", self.cube, "--field", "speed")
+        self.reject(2, "nothing.vtu", "compare", "nothing.vtu")
+        self.reject(2, "", "compare")
+        self.reject(2, "would replace", "compare", self.cube, "--json", "cube.vtu")
+
+    def test_paper_tables_mirror_the_mesh(self):
+        text = self.succeed("paper-tables", self.cube, "--max-size", "128", "--runs", "1", "--json", "tables.json")
+        for word in ("Ael", "Rnd", "ToT", "#Poly", "Weiler", "128 x 64 x 32", "quad cube", "WestM/C"):
+            self.assertIn(word, text)
+        sets = json.loads((self.folder / "tables.json").read_text())["data_sets"]
+        self.assertEqual([s["elements"] for s in sets], [6, 12, 24])
+        self.assertEqual([len(s["grids"]) for s in sets], [1, 2, 2])
+        grid = sets[0]["grids"][0]
+        self.assertEqual(grid["points"], [128, 64, 32])
+        self.assertEqual(grid["published"]["MultiComb"]["tot_s"], 0.69)
+        self.assertEqual(grid["published"]["Software"]["tot_s"], 0.80)
+        self.assertEqual(grid["measured"]["software"]["statistics"]["covered_points"], 128 * 64 * 32)
+
+    def test_paper_tables_need_a_scalar_field(self):
+        extra = f'<DataArray type="Float64" Name="v" NumberOfComponents="3" format="ascii">{" ".join(["1"] * 24)}</DataArray>'
+        self.write("vector.vtu", vtu_text(fields={}, extra=extra))
+        self.reject(2, "scalar --field", "paper-tables", "vector.vtu")
+        self.reject(2, "", "paper-tables", self.cube, "--max-size", "100")
+
+
 class Help(AppTest):
     def test_every_command_has_help_with_an_example(self):
-        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"]):
+        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"]):
             text = self.succeed(*command, "--help")
             self.assertIn("Example", text)
         self.assertRegex(self.succeed("--version"), r"^tessera \d+\.\d+\.\d+\n$")

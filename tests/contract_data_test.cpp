@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 
 #include "contract_suite.h"
@@ -30,24 +32,23 @@ std::vector<fs::path> meshFiles() {
     return files;
 }
 
-using OnFile = std::tuple<const Resampler*, fs::path>;
+using OnFile = std::tuple<Subject, fs::path>;
 
 class ContractOnData : public testing::TestWithParam<OnFile> {
   protected:
     void SetUp() override {
-        const std::string reason = resampler().unavailableReason();
-        if (!reason.empty()) GTEST_SKIP() << resampler().name() << ": " << reason;
+        TESSERA_CONTRACT_NEEDS(subject());
         mesh_ = readMesh(std::get<1>(GetParam()), {}, {}).mesh;
         addElementIdField(mesh_, "element of the test");
         addRandomField(mesh_, "random of the test", FieldLocation::point, 1, 0, 1, 3);
     }
-    const Resampler& resampler() const { return *std::get<0>(GetParam()); }
+    const Subject& subject() const { return std::get<0>(GetParam()); }
 
     /// About `points` lattice points along the longest axis.
     std::vector<LatticeCase> lattices(int points) const {
         const Vec3d size = mesh_.boundsWorld().size();
         const double longest = std::max({size.x, size.y, size.z});
-        return latticesAbout(mesh_, longest / scaledPoints(points), points);
+        return latticesAbout(mesh_, longest / scaledPoints(points), pointsFor(subject(), points));
     }
 
     TetMesh mesh_;
@@ -55,7 +56,8 @@ class ContractOnData : public testing::TestWithParam<OnFile> {
 
 TEST_P(ContractOnData, HasNoHolesSpillOvershootOrWrongValues) {
     ContractReport total;
-    for (const LatticeCase& at : lattices(32)) total += expectContract(resampler(), mesh_, at);
+    for (const LatticeCase& at : lattices(32))
+        if (takes(subject(), at)) total += expectContract(subject(), mesh_, at);
     EXPECT_GT(total.inMesh, 0);
     RecordProperty("worst_accuracy_ratio", std::to_string(total.worstRatio));
     RecordProperty("covered", std::to_string(total.covered));
@@ -63,16 +65,25 @@ TEST_P(ContractOnData, HasNoHolesSpillOvershootOrWrongValues) {
 
 TEST_P(ContractOnData, GivesTheSameBitsAlways) {
     for (const LatticeCase& at : lattices(40))
-        if (at.name == "aligned") expectDeterministic(resampler(), mesh_, at);
+        if (at.name == "aligned") expectDeterministic(subject(), mesh_, at);
+}
+
+TEST_P(ContractOnData, HoldsAt128PointsAlongTheLongestSide) {
+    const std::int64_t every = std::max(1, int(std::lround((subject().isPrimary ? 16 : 64) / scale())));
+    const LatticeCase at = latticeOver(mesh_, std::min(128, scaledPoints(128)));
+    const ContractReport report = expectContract(subject(), mesh_, at, {.valuesEvery = every});
+    EXPECT_GT(report.inMesh, 0);
+    RecordProperty("worst_accuracy_ratio", std::to_string(report.worstRatio));
+    RecordProperty("covered", std::to_string(report.covered));
 }
 
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(ContractOnData);
 INSTANTIATE_TEST_SUITE_P(All, ContractOnData,
-                         testing::Combine(testing::ValuesIn(resamplers().begin(), resamplers().end()),
+                         testing::Combine(testing::ValuesIn(subjectsOf(resamplers())),
                                           testing::ValuesIn(meshFiles())),
                          [](const testing::TestParamInfo<OnFile>& param) {
                              const fs::path& file = std::get<1>(param.param);
-                             std::string name = std::string(std::get<0>(param.param)->name()) + "_" +
+                             std::string name = std::get<0>(param.param).name + "_" +
                                                 file.parent_path().filename().string() + "_" +
                                                 file.filename().string();
                              for (char& c : name)

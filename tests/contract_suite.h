@@ -1,13 +1,15 @@
 #pragma once
 
-#include <functional>
+#include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "contract_cases.h"
 #include "reference/check_contract.h"
 #include "resample/resampler.h"
 
-// What the contract tests share: meshes, lattices, and the checks of one resampler on one of each.
+// What the contract tests share: who is tested, and the checks of one subject on one mesh and lattice.
 
 namespace tessera::contract {
 
@@ -17,37 +19,52 @@ double scale();
 /// `points` lattice points along an axis, fewer at a smaller scale.
 int scaledPoints(int points);
 
-struct MeshCase {
-    std::string name;  ///< letters and digits: part of a test's name
-    std::function<TetMesh()> make;
-    /// A length that node coordinates are multiples of, for lattices with nodes on lattice points; 0: the
-    /// longest side over 16.
-    double alignedSpacing = 0;
-};
-const std::vector<MeshCase>& meshCases();
+/// A resampler with a target and a format.
+struct Subject {
+    const Resampler* resampler = nullptr;
+    std::string target;  ///< empty: the default
+    SampleFormat format = SampleFormat::r32f;
+    /// The first of its resampler. The others meet all meshes, but fewer lattices and points.
+    bool isPrimary = true;
+    bool isRequired = false;  ///< with TESSERA_REQUIRE_GL=1, to be unavailable is a failure
+    std::string name;         ///< "Software", "SlicingOsmesa", "SlicingR8": part of a test's name
 
-struct LatticeCase {
-    std::string name;
-    Lattice lattice;
-    IndexBox box;
+    BindOptions bindOptions() const { return {target, format, Classification::arithmetic}; }
+    ContractBounds bounds() const;
+    /// Empty when it can run here.
+    std::string unavailableReason() const;
+    bool isOnDevice() const { return !resampler->targetsAgree(); }
 };
-/// Lattices about a mesh: aligned with its bounds, at half and third offsets, far coarser, far finer,
-/// anisotropic, left-handed, and oriented cut planes.
-std::vector<LatticeCase> latticesAbout(const TetMesh& mesh, double alignedSpacing, int pointsAlong);
+/// For listings of tests.
+inline void PrintTo(const Subject& subject, std::ostream* out) {
+    *out << subject.name;
+}
 
-/// Point and cell fields of every kind: smooth, constant, random, of huge and tiny size, on a large offset,
-/// not finite in places, and each element's index.
-void addTestFields(TetMesh& mesh);
+/// The subjects of one resampler: every format on the default target; where targets differ in their bits,
+/// besides, r32f on each there may be, available or not (nothing is asked of a driver here, because tests are
+/// listed more often than run). Sanitizers see few drivers or none: Mesa isn't built for them.
+std::vector<Subject> subjectsOf(const Resampler& resampler);
+std::vector<Subject> subjectsOf(std::span<const Resampler* const> resamplers);
+
+/// A subject's part of the lattices: all, or about half for one that isn't primary.
+bool takes(const Subject& subject, const LatticeCase& at);
+/// The lattices on which bits are compared; fewer on a device, where a run has a price of its own.
+bool comparesBits(const Subject& subject, const LatticeCase& at);
+/// Points along the longest side for a subject.
+int pointsFor(const Subject& subject, int points);
 
 std::vector<int> allFields(const TetMesh& mesh);
 
 struct Sampling {
-    std::string target;  ///< empty: the default
+    BindOptions bind;
     int threads = 1;
 };
 /// The blocks of several boxes.
 std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,
                           const Lattice& lattice, std::span<const IndexBox> boxes, const Sampling& sampling);
+/// The block of one box.
+Block sample(const Subject& subject, const TetMesh& mesh, std::span<const int> fields, const Lattice& lattice,
+             const IndexBox& box);
 
 /// Boxes of `edge`^3 points that fill a box; on the upper sides they may be smaller.
 std::vector<IndexBox> cut(const IndexBox& box, int edge);
@@ -56,9 +73,26 @@ std::vector<IndexBox> cut(const IndexBox& box, int edge);
 /// its box.
 std::int64_t differences(const Block& part, const Block& whole);
 
-/// Clauses 1 to 5 at every point; fails the test with the first offence. Returns the figures.
-ContractReport expectContract(const Resampler& resampler, const TetMesh& mesh, const LatticeCase& at);
-/// Clause 5: the same bits for threads, bricks, targets, overlapping boxes and other elements elsewhere.
-void expectDeterministic(const Resampler& resampler, const TetMesh& mesh, const LatticeCase& at);
+/// Clauses 1 to 5 at every point.
+ContractReport measureContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,
+                               const CheckOptions& options = {});
+/// The same; fails the test with the first offence.
+ContractReport expectContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,
+                              const CheckOptions& options = {});
+
+/// Clause 5: the ways of sampling that gave other bits than one box on one thread: threads, bricks, runs,
+/// overlapping boxes, other elements elsewhere, and targets where they agree.
+std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& mesh, const LatticeCase& at);
+/// Expects none.
+void expectDeterministic(const Subject& subject, const TetMesh& mesh, const LatticeCase& at);
 
 }  // namespace tessera::contract
+
+/// In a test or its SetUp: goes on only when the subject can run here.
+#define TESSERA_CONTRACT_NEEDS(subject)                                              \
+    if (const std::string reason = (subject).unavailableReason(); !reason.empty()) { \
+        const char* requireGl = std::getenv("TESSERA_REQUIRE_GL");                   \
+        if ((subject).isRequired && requireGl && std::string_view(requireGl) == "1") \
+            FAIL() << (subject).name << " is required and can't run: " << reason;    \
+        GTEST_SKIP() << (subject).name << ": " << reason;                            \
+    }

@@ -1,5 +1,8 @@
 tessera_test(mesh_test LINK mesh PRIVATE_LINK tessera_gmp)
 tessera_test(split_test LINK mesh)
+tessera_test(mirror_test LINK mesh)
+tessera_test(plane_query_test LINK reference PRIVATE_LINK tessera_gmp)
+tessera_test(cut_plane_test LINK reference registry)
 if(TESSERA_BUILD_IO)
   tessera_test(read_mesh_test LINK io)
   tessera_test(read_bad_input_test LINK io)

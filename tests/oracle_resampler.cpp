@@ -83,6 +83,7 @@ class BoundOracle : public BoundResampler {
 std::unique_ptr<BoundResampler> OracleResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                       const BindOptions& options) const {
     if (!options.target.empty() && options.target != "default") throw InputError("the oracle has one target");
+    if (options.format != SampleFormat::r32f) throw InputError("the oracle has one format");
     return std::make_unique<BoundOracle>(mesh, fields);
 }
 

@@ -261,7 +261,7 @@ TEST(ReferenceBlock, FilterChangesNothing) {
         const Lattice turned{bounds.min, {h, h / 3, 0}, {-h / 3, h, 0}, {0, h / 5, h}};
         for (const Lattice& lattice :
              {Lattice::axisParallel(bounds.min, h), Lattice::axisParallel(bounds.min + step, h), turned})
-            for (const double tolerance : {1.0 / 4096, 0.25}) {
+            for (const double tolerance : {0x1p-12, 0x1p-8, 0.25}) {
                 const Oracle oracle(mesh, lattice);
                 const IndexBox box{Vec3i(-2), Vec3i(11)};
                 const auto fast = referenceBlock(oracle, box, {.toleranceVoxels = tolerance});
@@ -271,6 +271,30 @@ TEST(ReferenceBlock, FilterChangesNothing) {
                 EXPECT_LE(fast.exactPairs, slow.exactPairs);
             }
     }
+}
+
+TEST(ReferenceBlock, FilterChangesNothingForElementsAsThinAsTheTolerance) {
+    // A voxel is an eighth of the unit box; thicknesses run from a quarter of the tolerance to four times it.
+    constexpr double kTolerance = 0x1p-8, h = 0.125;
+    std::vector<TetMesh> meshes{boxMesh({.cells = {3, 3, 1}, .sizeWorld = {1, 1, kTolerance * h}}),
+                                hangingNodeMesh(1, 3)};
+    for (const double thickness : {0.25, 1.0, 4.0}) {
+        const double aspect = thickness * kTolerance * h;
+        meshes.push_back(thinTetsMesh(ThinKind::sliver, aspect, 1, 8, 31));
+        meshes.push_back(thinTetsMesh(ThinKind::needle, aspect, 1, 8, 32));
+        meshes.push_back(thinClusterMesh(aspect, 1, 12, 33));
+    }
+    for (const TetMesh& mesh : meshes)
+        for (const int far : {0, -511, 1 << 20}) {
+            const Vec3d origin = Vec3d(-0.3 * kTolerance * h) - h * double(far);
+            const Oracle oracle(mesh, Lattice::axisParallel(origin, h));
+            const IndexBox box{Vec3i(far - 1), Vec3i(far + 10)};
+            const auto fast = referenceBlock(oracle, box, {.toleranceVoxels = kTolerance});
+            const auto slow =
+                referenceBlock(oracle, box, {.toleranceVoxels = kTolerance, .isUnfiltered = true});
+            expectSame(fast, slow);
+            EXPECT_LE(fast.exactPairs, slow.exactPairs);
+        }
 }
 
 TEST(Generators, KuhnAndFiveTetBoxesFillTheBox) {

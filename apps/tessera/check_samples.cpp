@@ -47,8 +47,9 @@ bool locate(const TetMesh& mesh, std::int32_t element, const Vec3d& pointWorld, 
 }
 
 /// How far a stored value is from what this element allows; at most 0 when it is explained.
+/// @param formatStep what the format that values were sampled in may cost.
 double excess(const TetMesh& mesh, const Field& field, int component, std::int32_t element,
-              const Place& place, double stored, double placeErrorWorld, bool halfFloat) {
+              const Place& place, double stored, double placeErrorWorld, double formatStep, bool halfFloat) {
     double exact = 0, largest = 0;
     Vec3d gradient(0);
     if (field.location == FieldLocation::cell) {
@@ -66,10 +67,20 @@ double excess(const TetMesh& mesh, const Field& field, int component, std::int32
         }
     }
     if (!std::isfinite(exact)) return 0;  // not valid there: nothing is claimed
-    double allowed = 4 * kFloatUlp * largest + double(std::numeric_limits<float>::min()) +
+    double allowed = formatStep + 4 * kFloatUlp * largest + double(std::numeric_limits<float>::min()) +
                      glm::length(gradient) * (placeErrorWorld + 2 * std::max(0.0, -place.depth));
     if (halfFloat) allowed += kHalfUlp * largest + kSmallestHalf;
     return std::abs(stored - exact) - allowed;
+}
+
+/// Sampling in the format may round a value by this: one step of the normalised formats over the field's
+/// range, one unit in the last place of a half float of the normalised value.
+double formatStep(const std::string& format, const Field& field, int component) {
+    const double range = fieldRange(field, component).width();
+    if (format == "r8") return range / 255;
+    if (format == "r16") return range / 65535;
+    if (format == "r16f") return range * kHalfUlp;
+    return 0;
 }
 
 class Checker {
@@ -81,7 +92,11 @@ class Checker {
           file_(file),
           resampler_(resampler),
           halfFloat_(halfFloat),
-          index_(mesh) {}
+          index_(mesh) {
+        for (const int f : fields)
+            for (int c = 0; c < mesh.fields[std::size_t(f)].components; ++c)
+                formatSteps_.push_back(formatStep(file.sampleFormat, mesh.fields[std::size_t(f)], c));
+    }
 
     void check(std::size_t leaf, const Vec3i& local, SampleCheck& result) {
         const BrickKey& key = file_.tree.leaves()[leaf];
@@ -169,9 +184,9 @@ class Checker {
                 }
                 double best = std::numeric_limits<double>::infinity();
                 for (const auto& [element, place] : places_)
-                    best = std::min(best,
-                                    excess(mesh_, field, c, element, place, stored,
-                                           resampler_.placeBoundVoxels() * spacing + rounding_, halfFloat_));
+                    best = std::min(best, excess(mesh_, field, c, element, place, stored,
+                                                 resampler_.placeBoundVoxels() * spacing + rounding_,
+                                                 formatSteps_[std::size_t(channel)], halfFloat_));
                 if (best <= 0) continue;
                 result.largestExcess = std::max(result.largestExcess, best);
                 note(result, result.wrongValues,
@@ -186,7 +201,8 @@ class Checker {
     const VdbFile& file_;
     const Resampler& resampler_;
     bool halfFloat_;
-    double rounding_ = 0;  // of the world place at work
+    std::vector<double> formatSteps_;  // one a channel
+    double rounding_ = 0;              // of the world place at work
     ElementIndex index_;
     std::vector<std::int32_t> candidates_;
     std::vector<std::pair<std::int32_t, Place>> places_;

@@ -2,8 +2,10 @@
 
 #include <filesystem>
 
+#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
+#include "gl_report.h"
 #include "io/read_mesh.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
@@ -18,7 +20,7 @@ Json documentHead(const std::string& path) {
             {"program", "tessera"},
             {"version", TESSERA_VERSION},
             {"command", "info"},
-            {"input", path}};
+            {"input", path.empty() ? Json() : Json(path)}};
 }
 
 Json gridsJson(const VdbFile& file) {
@@ -29,7 +31,8 @@ Json gridsJson(const VdbFile& file) {
     return grids;
 }
 
-int showVdb(const InfoArguments& arguments, Session& session) {
+/// Prints what the file holds, and gives the same as a document when one is wanted.
+Json showVdb(const InfoArguments& arguments, Session& session) {
     const VdbFile file = readVdb(arguments.path);
     std::vector<std::vector<std::string>> rows{{"grid", "active voxels"}};
     for (std::size_t g = 0; g < file.gridNames.size(); ++g)
@@ -44,16 +47,20 @@ int showVdb(const InfoArguments& arguments, Session& session) {
         arguments.path, file.version, file.layout == VdbLayout::flat ? "flat" : "levels", file.sourceFile,
         file.algorithm, file.criterion, origin.x, origin.y, origin.z, file.tree.spacingWorld(),
         file.tree.brickCells(), file.unitScale);
+    if (!file.target.empty()) text += fmt::format("  sampled on {}\n", file.target);
+    if (!file.sampleFormat.empty()) text += fmt::format("  sampled in format {}\n", file.sampleFormat);
     if (file.boundsWorld) {
         const Box3d& b = *file.boundsWorld;
         text += fmt::format("  bounds ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})\n", b.min.x,
                             b.min.y, b.min.z, b.max.x, b.max.y, b.max.z);
     }
     session.print(text + formatTable(rows) + levelsText(levels) + errorText(file.report));
-    if (arguments.common.jsonPath.empty()) return 0;
+    if (arguments.common.jsonPath.empty()) return {};
     Json json = documentHead(arguments.path);
     json["source"] = file.sourceFile;
     json["algorithm"] = file.algorithm;
+    if (!file.target.empty()) json["target"] = file.target;
+    if (!file.sampleFormat.empty()) json["sample_format"] = file.sampleFormat;
     json["criterion"] = file.criterion;
     json["layout"] = file.layout == VdbLayout::flat ? "flat" : "levels";
     json["unit_scale"] = file.unitScale;
@@ -63,11 +70,10 @@ int showVdb(const InfoArguments& arguments, Session& session) {
     json.update(levelsJson(file.tree, levels));
     json["coverage"] = coverageJson(file.report);
     json["error"] = errorJson(file.report);
-    writeJson(arguments.common.jsonPath, json);
-    return 0;
+    return json;
 }
 
-int showMesh(const InfoArguments& arguments, Session& session) {
+Json showMesh(const InfoArguments& arguments, Session& session) {
     Timer timer;
     const MeshFile file = readMesh(arguments.path, {{}, arguments.timeStep}, session.execution);
     StageTimes times;
@@ -75,29 +81,40 @@ int showMesh(const InfoArguments& arguments, Session& session) {
     const Box3d bounds = file.mesh.boundsWorld();
     const std::vector<FieldSummary> fields = summarizeFields(file.mesh);
     session.print(importText(arguments.path, file.statistics, bounds) + fieldsText(fields));
-    if (arguments.common.jsonPath.empty()) return 0;
+    if (arguments.common.jsonPath.empty()) return {};
     Json json = documentHead(arguments.path);
     json["stages"] = stagesJson(times);
     json["mesh"] = meshJson(file.statistics, bounds, fields);
-    writeJson(arguments.common.jsonPath, json);
-    return 0;
+    return json;
 }
 
 }  // namespace
 
 void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
-    command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote")->required();
+    command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote");
+    command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
     command.add_option("--time-step", arguments.timeStep,
                        "files with several steps: which one, counted from 0 (default: the last)");
     addCommonOptions(command, arguments.common);
-    command.footer("Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -");
+    command.footer(
+        "Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -\n  tessera info --gl");
 }
 
 int runInfo(const InfoArguments& arguments) {
+    if (arguments.path.empty() && !arguments.gl) throw InputError("info needs a file, or --gl");
     checkOutputPaths({arguments.path}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
-    const bool isVdb = std::filesystem::path(arguments.path).extension() == ".vdb";
-    return isVdb ? showVdb(arguments, session) : showMesh(arguments, session);
+    Json json = documentHead(arguments.path);
+    if (!arguments.path.empty()) {
+        const bool isVdb = std::filesystem::path(arguments.path).extension() == ".vdb";
+        json = isVdb ? showVdb(arguments, session) : showMesh(arguments, session);
+    }
+    if (arguments.gl) {
+        session.print(glText());
+        json["gl"] = glJson();
+    }
+    if (!arguments.common.jsonPath.empty()) writeJson(arguments.common.jsonPath, json);
+    return 0;
 }
 
 }  // namespace tessera

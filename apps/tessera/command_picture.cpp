@@ -197,9 +197,7 @@ int runPicture(const PictureArguments& arguments) {
     PictureOptions options;
     options.title = fmt::format("{}  {} = {:.4g}", field.name, arguments.axis, slice.positionWorld);
     if (!arguments.range.empty()) {
-        const std::vector<double> ends = parseNumbers("--range", arguments.range, 2);
-        if (!(ends[0] < ends[1]))
-            throw InputError(fmt::format("--range: expected a < b, got '{}'", arguments.range));
+        const std::array<double, 2> ends = parseRange("--range", arguments.range);
         options.min = ends[0];
         options.max = ends[1];
     }

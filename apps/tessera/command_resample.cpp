@@ -64,8 +64,12 @@ class ResampleRun {
     explicit ResampleRun(const ResampleArguments& arguments)
         : arguments_(arguments),
           settings_(checkedSettings(arguments)),
-          resampler_(findResampler(arguments.algorithm)),
-          session_(arguments.common) {}
+          choice_(chooseResampler(arguments.algorithm.name, settings_.refine.bind)),
+          resampler_(*choice_.resampler),
+          session_(arguments.common) {
+        settings_.write.algorithm = resampler_.name();
+        if (!choice_.reason.empty()) session_.print(choice_.reason + "\n");
+    }
     int run();
 
   private:
@@ -87,6 +91,7 @@ class ResampleRun {
 
     const ResampleArguments& arguments_;
     ResampleSettings settings_;
+    ResamplerChoice choice_;
     const Resampler& resampler_;
     Session session_;
     StageTimes allTimes_;
@@ -207,7 +212,9 @@ Json ResampleRun::runStep(const Step& step) {
                 {"command", "resample"},
                 {"input", step.input},
                 {"output", arguments_.dryRun ? Json(nullptr) : Json(step.output)},
-                {"algorithm", arguments_.algorithm},
+                {"algorithm", resampler_.name()},
+                {"algorithm_reason", choice_.reason},
+                {"sample_format", nameOf(settings_.refine.bind.format)},
                 {"criterion", arguments_.refine},
                 {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
@@ -250,7 +257,7 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
     estimate.flatBytes = flat.bytes;
     if (!flat.note.empty()) notes.push_back(flat.note);
     const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels,
-                                            resampler_, session_.execution);
+                                            resampler_, options.bind, session_.execution);
     std::string text = estimateText(estimate, cost.levelsMs, cost.flatMs);
     for (const std::string& note : notes) text += "  " + note + "\n";
     session_.print(text + "  nothing was written\n");
@@ -277,6 +284,8 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     times.extendMs = timer.restart();
     VdbWriteOptions options = writeOptions();
     options.sourceFile = std::filesystem::path(step.input).filename().string();
+    // Where every target gives the same bits, naming one would make the file depend on the processor.
+    if (!resampler_.targetsAgree()) options.target = result.target;
     VdbWriteResult written =
         writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
                  reconstruction ? &*reconstruction : nullptr, options, session_.execution);
@@ -311,6 +320,7 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
                               {"stopped_because", result.stoppedBecause},
                               {"rounds", result.rounds}};
     json["notes"] = result.notes;
+    json["target"] = result.target;
     json["statistics"] = statisticsJson(result.statistics);
     json["write"] = writeResultJson(written);
     json["sample_bytes"] = sampleBytes;

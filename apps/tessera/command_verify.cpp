@@ -159,7 +159,7 @@ int runVerify(const VerifyArguments& arguments) {
     const ErrorReport measured =
         measureError(mesh, fields, file.tree, file.store, nearest, session.execution, measure);
     const std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
-    const SampleCheck samples = checkSamples(mesh, fields, file, findResampler(file.algorithm),
+    const SampleCheck samples = checkSamples(mesh, fields, file, namedResampler(file.algorithm),
                                              file.halfFloat, arguments.samples, session.execution);
     times.verifyMs = timer.elapsedMs();
     const bool holds = samples.good() &&

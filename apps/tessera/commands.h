@@ -28,6 +28,7 @@ struct InfoArguments {
     CommonOptions common;
     std::string path;
     int timeStep = -1;
+    bool gl = false;
 };
 struct VerifyArguments {
     CommonOptions common;
@@ -49,10 +50,38 @@ struct PictureArguments {
     bool bricks = false;
 };
 
+struct SliceArguments {
+    CommonOptions common;
+    AlgorithmArguments algorithm;
+    std::string input, output, origin, normal = "0,0,1", up, size, fields, range;
+    std::optional<int> component;
+    int resolution = 1024;
+    int timeStep = -1;
+};
+struct CompareArguments {
+    CommonOptions common;
+    std::vector<std::string> meshes;
+    std::string algorithms, fields;  ///< empty: all
+    AlgorithmArguments algorithm;    ///< its name is not used
+    std::optional<int> resolution;
+    std::optional<double> spacing;
+    int runs = 3, boxEdge = 128, timeStep = -1;
+    bool markdown = false;
+};
+struct PaperTablesArguments {
+    CommonOptions common;
+    std::string mesh, field;
+    AlgorithmArguments algorithm;  ///< its name is not used
+    int runs = 3, maxSize = 1024;
+};
+
 void addInfoOptions(CLI::App& command, InfoArguments& arguments);
 void addVerifyOptions(CLI::App& command, VerifyArguments& arguments);
 void addTetsOptions(CLI::App& command, TetsArguments& arguments);
 void addPictureOptions(CLI::App& command, PictureArguments& arguments);
+void addSliceOptions(CLI::App& command, SliceArguments& arguments);
+void addCompareOptions(CLI::App& command, CompareArguments& arguments);
+void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& arguments);
 
 /// Each returns the exit code and throws the library's errors.
 int runResample(const ResampleArguments& arguments);
@@ -60,5 +89,8 @@ int runInfo(const InfoArguments& arguments);
 int runVerify(const VerifyArguments& arguments);
 int runTets(const TetsArguments& arguments);
 int runPicture(const PictureArguments& arguments);
+int runCompare(const CompareArguments& arguments);
+int runPaperTables(const PaperTablesArguments& arguments);
+int runSlice(const SliceArguments& arguments);
 
 }  // namespace tessera

@@ -31,6 +31,9 @@ struct Arguments {
     tessera::VerifyArguments verify;
     tessera::TetsArguments tets;
     tessera::PictureArguments picture;
+    tessera::CompareArguments compare;
+    tessera::PaperTablesArguments paperTables;
+    tessera::SliceArguments slice;
 };
 
 void describe(CLI::App& app, Arguments& arguments) {
@@ -46,14 +49,23 @@ void describe(CLI::App& app, Arguments& arguments) {
     tessera::addResampleOptions(
         *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
         arguments.resample);
-    tessera::addInfoOptions(*app.add_subcommand("info", "what a mesh file or a .vdb file holds"),
-                            arguments.info);
+    tessera::addInfoOptions(
+        *app.add_subcommand("info", "what a mesh file or a .vdb file holds, or what OpenGL there is"),
+        arguments.info);
     tessera::addVerifyOptions(
         *app.add_subcommand("verify", "check a .vdb file's error report against its mesh"), arguments.verify);
     tessera::addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"),
                             arguments.tets);
     tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
                                arguments.picture);
+    tessera::addCompareOptions(
+        *app.add_subcommand("compare", "several algorithms on one lattice: coverage, values, times"),
+        arguments.compare);
+    tessera::addPaperTablesOptions(
+        *app.add_subcommand("paper-tables", "the algorithms' times beside those of the paper they come from"),
+        arguments.paperTables);
+    tessera::addSliceOptions(*app.add_subcommand("slice", "cut a mesh with any plane: a float EXR or a .png"),
+                             arguments.slice);
     for (CLI::App* command : app.get_subcommands({}))
         if (CLI::Option* step = command->get_option_no_throw("--time-step"))
             step->check(CLI::Range(0, std::numeric_limits<int>::max()));
@@ -68,6 +80,9 @@ int run(const CLI::App& app, const Arguments& arguments) {
         return tessera::runVerify(verify);
     }
     if (app.got_subcommand("tets")) return tessera::runTets(arguments.tets);
+    if (app.got_subcommand("slice")) return tessera::runSlice(arguments.slice);
+    if (app.got_subcommand("compare")) return tessera::runCompare(arguments.compare);
+    if (app.got_subcommand("paper-tables")) return tessera::runPaperTables(arguments.paperTables);
     return tessera::runPicture(arguments.picture);
 }
 

@@ -137,7 +137,6 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
         .add_option("--time-step", a.timeStep,
                     "files with several steps: which one, counted from 0 (default: the last)")
         ->group(group);
-    command.add_option("--algorithm", a.algorithm, "the resampler")->capture_default_str()->group(group);
 }
 
 void checkRanges(const ResampleArguments& a) {
@@ -210,6 +209,52 @@ void addCommonOptions(CLI::App& command, CommonOptions& options) {
                        "write a report as JSON to this file, or to standard output for -");
 }
 
+void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
+    const std::string group = "How to sample";
+    command
+        .add_option("--algorithm", a.name,
+                    "the resampler, or auto: the fastest that this machine has (results may then differ from "
+                    "machine to machine)")
+        ->capture_default_str()
+        ->group(group);
+    addBindOptions(command, a);
+}
+
+void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
+    const std::string group = "How to sample";
+    command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
+        ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}))
+        ->group(group);
+    command
+        .add_option(
+            "--sample-format", a.sampleFormat,
+            "what an OpenGL resampler keeps values in; r16 and r8 divide the field's range into steps")
+        ->check(CLI::IsMember({"r32f", "r16f", "r16", "r8"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--classification", a.classification,
+                    "how an OpenGL resampler decides what an element covers: by arithmetic, which meets the "
+                    "contract, or as the method was published, to see what that costs")
+        ->check(CLI::IsMember({"arithmetic", "published"}))
+        ->capture_default_str()
+        ->group(group);
+}
+
+BindOptions bindOptions(const AlgorithmArguments& a) {
+    BindOptions options;
+    options.target = a.gl;
+    for (const SampleFormat format :
+         {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8})
+        if (nameOf(format) == a.sampleFormat) options.format = format;
+    if (a.classification == "published") options.classification = Classification::published;
+    return options;
+}
+
+std::string lossyFormat(const BindOptions& options) {
+    return options.format == SampleFormat::r32f ? std::string() : std::string(nameOf(options.format));
+}
+
 void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")
         ->required();
@@ -217,6 +262,7 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
                        "the .vdb file; #### stands for the step's number in a series");
     addRefineOptions(command, a);
     addOutputOptions(command, a);
+    addAlgorithmOptions(command, a.algorithm);
     addCommonOptions(command, a.common);
     command.footer(R"(Examples:
   tessera resample flow.vtu -o flow.vdb
@@ -241,7 +287,9 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
     s.write.unitScale = a.unitScale.value_or(0);
     s.write.maxFlatVoxels = s.refine.maxVoxels;
-    s.write.algorithm = a.algorithm;
+    s.refine.bind = bindOptions(a.algorithm);
+    s.write.algorithm = a.algorithm.name;
+    s.write.sampleFormat = lossyFormat(s.refine.bind);
     s.write.criterion = a.refine;
     return s;
 }
@@ -292,6 +340,17 @@ std::vector<double> parseNumbers(const std::string& option, const std::string& t
     std::vector<double> values;
     for (const std::string& part : parts) values.push_back(parseNumber(option, part));
     return values;
+}
+
+std::array<double, 2> parseRange(const std::string& option, const std::string& text) {
+    const std::vector<double> ends = parseNumbers(option, text, 2);
+    require(ends[0] < ends[1], fmt::format("{}: expected a < b, got '{}'", option, text));
+    return {ends[0], ends[1]};
+}
+
+Vec3d parseVector(const std::string& option, const std::string& text) {
+    const std::vector<double> v = parseNumbers(option, text, 3);
+    return {v[0], v[1], v[2]};
 }
 
 Box3d parseBounds(const std::string& text) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/App.hpp>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -25,12 +26,19 @@ struct FieldChoice {
     std::string name;
 };
 
+/// The resampler and what it runs with, as typed.
+struct AlgorithmArguments {
+    std::string name = "software";
+    std::string gl;  ///< empty: the first that can be had
+    std::string sampleFormat = "r32f", classification = "arithmetic";
+};
+
 /// The words of `tessera resample`, as typed.
 struct ResampleArguments {
     CommonOptions common;
     std::string input, output;
-    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max",
-                algorithm = "software";
+    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max";
+    AlgorithmArguments algorithm;
     std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;
     std::optional<std::string> maxError;
@@ -54,7 +62,14 @@ struct ResampleSettings {
 };
 
 void addCommonOptions(CLI::App& command, CommonOptions& options);
+void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& arguments);
+/// The same without --algorithm, for commands that run several.
+void addBindOptions(CLI::App& command, AlgorithmArguments& arguments);
 void addResampleOptions(CLI::App& command, ResampleArguments& arguments);
+
+BindOptions bindOptions(const AlgorithmArguments& arguments);
+/// The format's name when it isn't r32f, which loses nothing; else empty.
+std::string lossyFormat(const BindOptions& options);
 
 /// Throws InputError naming the option, what was expected and what came.
 ResampleSettings checkedSettings(const ResampleArguments& arguments);
@@ -65,6 +80,10 @@ std::int64_t parseCount(const std::string& option, const std::string& text, bool
 std::vector<FieldChoice> parseFields(const std::string& text);
 /// `count` finite numbers with commas between them. Throws InputError naming `option`.
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, std::size_t count);
+/// "a,b" with a < b. Throws InputError naming `option`.
+std::array<double, 2> parseRange(const std::string& option, const std::string& text);
+/// "x,y,z". Throws InputError naming `option`.
+Vec3d parseVector(const std::string& option, const std::string& text);
 /// "x0,y0,z0,x1,y1,z1". Throws InputError.
 Box3d parseBounds(const std::string& text);
 

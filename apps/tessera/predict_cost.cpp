@@ -31,11 +31,11 @@ double sampleMs(BoundResampler& bound, const BrickTree& tree, std::int64_t strid
 
 CostPrediction predictCost(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                            const PlanEstimate& estimate, int channels, const Resampler& resampler,
-                           const Execution& execution) {
+                           const BindOptions& bind, const Execution& execution) {
     CostPrediction cost;
     const std::int64_t leaves = std::int64_t(tree.leafCount());
     if (leaves == 0) return cost;
-    const auto bound = resampler.bind(mesh, fields);
+    const auto bound = resampler.bind(mesh, fields, bind);
     Execution silent = execution;
     silent.progress = nullptr;
     // Every call passes over all elements once, whatever it samples: a call for one leaf tells that part, a

@@ -17,6 +17,6 @@ struct CostPrediction {
 /// typical rate of OpenVDB with Blosc.
 CostPrediction predictCost(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                            const PlanEstimate& estimate, int channels, const Resampler& resampler,
-                           const Execution& execution);
+                           const BindOptions& bind, const Execution& execution);
 
 }  // namespace tessera

@@ -97,7 +97,7 @@ class ErrorRefinement {
           fields_(fields),
           options_(options),
           execution_(execution),
-          bound_(resampler.bind(mesh, fields)),
+          bound_(resampler.bind(mesh, fields, options.bind)),
           samples_(mesh, fields, execution),
           nearest_(mesh, execution.threads),
           bounds_(errorBounds(mesh, fields, samples_, options)),
@@ -375,6 +375,7 @@ BrickResult ErrorRefinement::run() {
     result.tree = std::move(tree_);
     result.store = std::move(store_);
     result.statistics = statistics_;
+    result.target = bound_->target();
     result.times = times_;
     result.rounds = rounds_;
     return result;
@@ -398,7 +399,8 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
     for (const int f : fields) channels += mesh.fields[std::size_t(f)].components;
     result.tree = planBricks(mesh, options, execution, channels, &result.notes);
     result.times.planMs = timer.restart();
-    const auto bound = resampler.bind(mesh, fields);
+    const auto bound = resampler.bind(mesh, fields, options.bind);
+    result.target = bound->target();
     result.store = resampleTree(result.tree, *bound, channels, execution, result.statistics);
     result.times.resampleMs = timer.restart();
     const NearestOnDemand nearest(mesh, execution.threads);

@@ -44,6 +44,7 @@ struct RefineOptions {
     std::optional<Box3d> boundsWorld;  ///< sample only the bricks that this box needs (whole bricks)
     std::optional<FixedFrame> frame;   ///< instead of resolution and spacing; level 0 is then its spacing,
                                        ///< even when no brick is so fine
+    BindOptions bind;                  ///< what the resampler runs with
 };
 
 /// What a plan would cost, before sampling.
@@ -78,6 +79,7 @@ struct BrickResult {
     BrickStore store;
     ErrorReport report;
     ResampleStatistics statistics;
+    std::string target;  ///< the code path that sampled it, one of Resampler::targets()
     BrickTimes times;
     bool bounded = false;            ///< error: the measured error on the final tree is within the bound
     std::string stoppedBecause;      ///< error: empty when bounded, else which budget ended the refinement

@@ -41,6 +41,8 @@ struct VdbWriteOptions {
     std::int64_t maxFlatBytes = 0;     ///< flat: bound on the grids' memory; 0: a quarter of the machine's
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     std::string algorithm, criterion, sourceFile;
+    std::string target;        ///< the device, of algorithms whose results depend on it; else empty
+    std::string sampleFormat;  ///< what values were kept in while sampling; empty: 32-bit floats
 };
 
 /// What was written.
@@ -84,6 +86,7 @@ struct VdbFile {
     ErrorReport report;  ///< as stated in the file
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
+    std::string target, sampleFormat;  ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
     bool halfFloat = false;            ///< values were rounded to half floats

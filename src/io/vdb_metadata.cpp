@@ -230,6 +230,8 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_version"] = metadata.version;
     entries["tessera_source"] = metadata.sourceFile;
     entries["tessera_algorithm"] = metadata.algorithm;
+    if (!metadata.target.empty()) entries["tessera_target"] = metadata.target;
+    if (!metadata.sampleFormat.empty()) entries["tessera_sample_format"] = metadata.sampleFormat;
     entries["tessera_criterion"] = metadata.criterion;
     entries["tessera_layout"] = choiceName(metadata.layout, kLayouts);
     entries["tessera_up_axis"] = choiceName(metadata.upAxis, kUpAxes);
@@ -257,6 +259,9 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     metadata.sourceFile = entry(entries, "tessera_source");
     metadata.algorithm = entry(entries, "tessera_algorithm");
     metadata.criterion = entry(entries, "tessera_criterion");
+    if (entries.contains("tessera_target")) metadata.target = entry(entries, "tessera_target");
+    if (entries.contains("tessera_sample_format"))
+        metadata.sampleFormat = entry(entries, "tessera_sample_format");
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");

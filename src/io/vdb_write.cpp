@@ -411,6 +411,8 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.sourceFile = options.sourceFile;
     metadata.algorithm = options.algorithm;
     metadata.criterion = options.criterion;
+    metadata.target = options.target;
+    metadata.sampleFormat = options.sampleFormat;
     metadata.unitScale = written.unitScale;
     metadata.upAxis = options.upAxis;
     metadata.halfFloat = options.halfFloat;

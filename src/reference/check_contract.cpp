@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "reference/format_allowance.h"
+#include "reference/random.h"
 
 namespace tessera {
 
@@ -27,17 +29,8 @@ std::string format(const char* pattern, ...) {
 struct Channel {
     const Field* field;
     int component;
+    FormatAllowance allowance;
 };
-
-/// Distance from |x| to the next float.
-double floatUlp(double x) {
-    const double most = std::abs(x);
-    if (most < double(std::numeric_limits<float>::min()))
-        return double(std::numeric_limits<float>::denorm_min());
-    int exponent = 0;
-    std::frexp(most, &exponent);
-    return std::ldexp(1.0, exponent - 24);
-}
 
 enum class Fault { none, overshoot, inaccurate, wrongCellValue, wrongValidity };
 
@@ -60,23 +53,16 @@ class Owner {
     Fit fit(const Channel& channel, float value, double uninteresting) {
         if (channel.field->location == FieldLocation::cell) return fitCell(channel, value);
         const std::array<double, 4> nodes = nodeValues(channel);
-        float low = std::numeric_limits<float>::infinity(), high = -low;
-        double largest = 0;
-        bool isFinite = true;
-        for (const double f : nodes) {
-            isFinite = isFinite && std::isfinite(float(f));
-            low = std::min(low, float(f)), high = std::max(high, float(f));
-            largest = std::max(largest, std::abs(f));
-        }
-        if (!isFinite) return {std::isnan(value) ? Fault::none : Fault::wrongValidity, 0};
+        if (!std::all_of(nodes.begin(), nodes.end(), [](double f) { return std::isfinite(float(f)); }))
+            return {std::isnan(value) ? Fault::none : Fault::wrongValidity, 0};
         if (!std::isfinite(value)) return {Fault::wrongValidity, 0};
-        if (value < low || value > high) return {Fault::overshoot, 0};
+        if (!channel.allowance.isInRange(value, nodes)) return {Fault::overshoot, 0};
 
-        const double ulps = 4 * floatUlp(largest);
-        double ratio = std::abs(double(value) - interpolate(nodes)) / ulps;
+        const double error = channel.allowance.error(nodes);
+        double ratio = std::abs(double(value) - interpolate(nodes)) / error;
         if (ratio <= uninteresting) return {Fault::none, ratio};
-        const double allowed = ulps + gradient(channel) * bounds_->placeVoxels;
-        ratio *= ulps / allowed;
+        const double allowed = error + gradient(channel) * bounds_->placeVoxels;
+        ratio *= error / allowed;
         if (ratio > 0.99)
             ratio = std::abs(mpq_class(exact(channel) - mpq_class(double(value))).get_d()) / allowed;
         return {ratio <= 1 ? Fault::none : Fault::inaccurate, ratio};
@@ -103,9 +89,14 @@ class Owner {
 
   private:
     Fit fitCell(const Channel& channel, float value) const {
-        const auto own = float(channel.field->at(candidate_.element, channel.component));
-        if (!std::isfinite(own) && !std::isfinite(value)) return {};
-        return {value == own ? Fault::none : Fault::wrongCellValue, 0};
+        const double own = channel.field->at(candidate_.element, channel.component);
+        const bool isFinite = std::isfinite(float(own));
+        if (isFinite != std::isfinite(value)) return {Fault::wrongValidity, 0};
+        if (!isFinite) return {};
+        if (!channel.allowance.isOwn(value, own)) return {Fault::wrongCellValue, 0};
+        return {Fault::none, channel.allowance.isStepped()
+                                 ? std::abs(double(value) - own) / channel.allowance.error(std::span(&own, 1))
+                                 : 0};
     }
 
     std::array<double, 4> nodeValues(const Channel& channel) const {
@@ -153,11 +144,12 @@ class Owner {
 class Checker {
   public:
     Checker(const Block& block, const ReferenceBlock& reference, const Oracle& oracle,
-            std::span<const int> fields, const ContractBounds& bounds)
-        : block_(block), reference_(reference), oracle_(oracle), bounds_(bounds) {
+            std::span<const int> fields, const ContractBounds& bounds, const CheckOptions& options)
+        : block_(block), reference_(reference), oracle_(oracle), bounds_(bounds), options_(options) {
         for (const int f : fields) {
             const Field& field = oracle.mesh().fields[std::size_t(f)];
-            for (int c = 0; c < field.components; ++c) channels_.push_back({&field, c});
+            for (int c = 0; c < field.components; ++c)
+                channels_.push_back({&field, c, FormatAllowance(bounds.format, finiteFloatRange(field, c))});
         }
         TESSERA_CHECK(block.box == reference.box, "block and reference are of different boxes");
         TESSERA_CHECK(block.channels == int(channels_.size()), "a block has a channel for every component");
@@ -193,7 +185,17 @@ class Checker {
             offend("spill", p, -1);
             return;
         }
+        if (!isChosen(p)) return;
+        ++report_.valued;
         checkValues(p, rightOwners(p));
+    }
+
+    /// About one point in options.valuesEvery, the same whatever the box.
+    bool isChosen(const Vec3i& p) const {
+        if (options_.valuesEvery <= 1) return true;
+        Random mix(std::uint64_t(std::uint32_t(p.x)) << 32 ^ std::uint64_t(std::uint32_t(p.y)) << 16 ^
+                   std::uint64_t(std::uint32_t(p.z)));
+        return mix.next() % std::uint64_t(options_.valuesEvery) == 0;
     }
 
     /// Candidates about as deep as the deepest; those that contain the point come first.
@@ -261,10 +263,13 @@ class Checker {
             return std::all_of(fits.begin(), fits.end(),
                                [&](const auto& f) { return f[channel].fault == fault; });
         };
-        if (channels_[channel].field->location == FieldLocation::cell || isOfAnother(p, channel)) {
+        const Channel& of = channels_[channel];
+        const bool isExactCell = of.field->location == FieldLocation::cell && !of.allowance.isStepped();
+        const bool isInvalid = all(Fault::wrongValidity);
+        if (isOfAnother(p, channel) || (isExactCell && !isInvalid)) {
             ++report_.wrongOwner;
             offend("wrong owner", p, int(channel));
-        } else if (all(Fault::wrongValidity)) {
+        } else if (isInvalid) {
             ++report_.wrongValidity;
             offend("wrong validity", p, int(channel));
         } else if (all(Fault::overshoot)) {
@@ -307,6 +312,7 @@ class Checker {
     const ReferenceBlock& reference_;
     const Oracle& oracle_;
     const ContractBounds& bounds_;
+    const CheckOptions& options_;
     std::vector<Channel> channels_;
     ContractReport report_;
 };
@@ -314,7 +320,7 @@ class Checker {
 }  // namespace
 
 ContractReport& ContractReport::operator+=(const ContractReport& other) {
-    points += other.points, inMesh += other.inMesh, covered += other.covered;
+    points += other.points, inMesh += other.inMesh, covered += other.covered, valued += other.valued;
     holes += other.holes, spill += other.spill, overshoot += other.overshoot;
     inaccurate += other.inaccurate, wrongOwner += other.wrongOwner, wrongValidity += other.wrongValidity;
     if (other.worstRatio > worstRatio) worstRatio = other.worstRatio, worstRatioPlace = other.worstRatioPlace;
@@ -324,20 +330,20 @@ ContractReport& ContractReport::operator+=(const ContractReport& other) {
 
 std::string ContractReport::summary() const {
     std::string text = format(
-        "points %lld, in mesh %lld, covered %lld; holes %lld, spill %lld, overshoot %lld, inaccurate %lld, "
-        "wrong owner "
-        "%lld, wrong validity %lld; worst accuracy ratio %.4f",
-        (long long)points, (long long)inMesh, (long long)covered, (long long)holes, (long long)spill,
-        (long long)overshoot, (long long)inaccurate, (long long)wrongOwner, (long long)wrongValidity,
-        worstRatio);
+        "points %lld, in mesh %lld, covered %lld, values checked at %lld; holes %lld, spill %lld, overshoot "
+        "%lld, inaccurate %lld, wrong owner %lld, wrong validity %lld; worst accuracy ratio %.4f",
+        (long long)points, (long long)inMesh, (long long)covered, (long long)valued, (long long)holes,
+        (long long)spill, (long long)overshoot, (long long)inaccurate, (long long)wrongOwner,
+        (long long)wrongValidity, worstRatio);
     if (!worstRatioPlace.empty()) text += " at " + worstRatioPlace;
     if (!firstOffence.empty()) text += "\n  first: " + firstOffence;
     return text;
 }
 
 ContractReport checkContract(const Block& block, const ReferenceBlock& reference, const Oracle& oracle,
-                             std::span<const int> fields, const ContractBounds& bounds) {
-    return Checker(block, reference, oracle, fields, bounds).run();
+                             std::span<const int> fields, const ContractBounds& bounds,
+                             const CheckOptions& options) {
+    return Checker(block, reference, oracle, fields, bounds, options).run();
 }
 
 }  // namespace tessera

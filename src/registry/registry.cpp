@@ -1,31 +1,122 @@
 #include "registry/registry.h"
 
+#include <algorithm>
 #include <array>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
+#include "hybrid/hybrid_resampler.h"
+#include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
 
 namespace tessera {
 
+namespace {
+
+/// What auto takes may be off by this much in place: as exact as graphics devices are.
+constexpr double kExactEnoughVoxels = 0x1p-8;
+
+std::string joined(const auto& names, const auto& text) {
+    std::string list;
+    for (const auto& name : names) list += (list.empty() ? "" : ", ") + std::string(text(name));
+    return list;
+}
+
+const Resampler& named(std::span<const Resampler* const> candidates, std::string_view name) {
+    for (const Resampler* resampler : candidates)
+        if (resampler->name() == name) return *resampler;
+    throw InputError("no algorithm named " + std::string(name) +
+                     "; there are: " + joined(candidates, [](const Resampler* r) { return r->name(); }));
+}
+
+const Resampler& available(const Resampler& resampler) {
+    const std::string reason = resampler.unavailableReason();
+    if (!reason.empty())
+        throw InputError("algorithm " + std::string(resampler.name()) + " can't run here: " + reason);
+    return resampler;
+}
+
+bool has(const auto& list, const auto& item) {
+    return std::find(list.begin(), list.end(), item) != list.end();
+}
+
+/// Empty when the resampler has the options, else the rest of a sentence that begins with its name.
+std::string whyNot(const Resampler& resampler, const BindOptions& options, bool checkTarget) {
+    const auto formats = resampler.formats();
+    if (!has(formats, options.format))
+        return "samples in " + joined(formats, [](SampleFormat format) { return nameOf(format); }) +
+               " only, not in " + std::string(nameOf(options.format));
+    const auto targets = resampler.targets();
+    if (checkTarget && !options.target.empty() && !has(targets, options.target))
+        return "has no target " + options.target + ", only " +
+               joined(targets, [](const std::string& target) { return target; });
+    return {};
+}
+
+std::string whyUnfit(const Resampler& resampler, const BindOptions& options) {
+    const std::string unavailable = resampler.unavailableReason();
+    if (!unavailable.empty()) return "can't run here (" + unavailable + ")";
+    if (resampler.placeBoundVoxels() > kExactEnoughVoxels) return "is not exact enough";
+    return whyNot(resampler, options, true);
+}
+
+}  // namespace
+
 std::span<const Resampler* const> resamplers() {
     static const SoftwareResampler software;
-    static const std::array<const Resampler*, 1> all{&software};
+    static const SlicingResampler slicing;
+    static const HybridResampler hybrid;
+    static const std::array<const Resampler*, 3> all{&software, &slicing, &hybrid};
     return all;
 }
 
 const Resampler& findResampler(std::string_view name) {
-    std::string names;
-    for (const Resampler* resampler : resamplers()) {
-        if (resampler->name() == name) {
-            const std::string reason = resampler->unavailableReason();
-            if (!reason.empty())
-                throw InputError("algorithm " + std::string(name) + " can't run here: " + reason);
-            return *resampler;
-        }
-        names += (names.empty() ? "" : ", ") + std::string(resampler->name());
+    return available(named(resamplers(), name));
+}
+
+const Resampler& namedResampler(std::string_view name) {
+    return named(resamplers(), name);
+}
+
+ResamplerChoice chooseResampler(std::string_view name, const BindOptions& options) {
+    return chooseResampler(resamplers(), name, options);
+}
+
+ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, std::string_view name,
+                                const BindOptions& options) {
+    if (name != "auto") {
+        const Resampler& resampler = available(named(candidates, name));
+        // Where targets are devices, binding says best why one can't be had.
+        const std::string reason = whyNot(resampler, options, resampler.targetsAgree());
+        if (!reason.empty()) throw InputError("algorithm " + std::string(name) + " " + reason);
+        return {&resampler, {}};
     }
-    throw InputError("no algorithm named " + std::string(name) + "; there are: " + names);
+    if (options.classification != Classification::arithmetic)
+        throw InputError(
+            "algorithm auto takes only what meets the contract: name an algorithm for another "
+            "classification");
+    ResamplerChoice choice;
+    std::vector<std::string> others;
+    for (const Resampler* resampler : candidates) {
+        const std::string reason = whyUnfit(*resampler, options);
+        if (!reason.empty()) {
+            others.push_back(std::string(resampler->name()) + " " + reason);
+            continue;
+        }
+        if (choice.resampler && choice.resampler->relativeCost() <= resampler->relativeCost()) {
+            others.push_back(std::string(resampler->name()) + " is slower here");
+            continue;
+        }
+        if (choice.resampler) others.push_back(std::string(choice.resampler->name()) + " is slower here");
+        choice.resampler = resampler;
+    }
+    std::string list;
+    for (const std::string& other : others) list += (list.empty() ? "" : "; ") + other;
+    if (!choice.resampler) throw InputError("no algorithm can be chosen automatically: " + list);
+    choice.reason = "auto chose " + std::string(choice.resampler->name()) +
+                    (list.empty() ? ", the only one there is" : ": " + list);
+    return choice;
 }
 
 }  // namespace tessera

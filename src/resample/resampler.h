@@ -96,6 +96,9 @@ class Resampler {
     virtual bool targetsAgree() const { return true; }
     /// Formats it can sample in, the exact one first.
     virtual std::vector<SampleFormat> formats() const { return {SampleFormat::r32f}; }
+    /// Time that sampling takes on this machine as a multiple of the software resampler's: a rough guess, for
+    /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow.
+    virtual double relativeCost() const { return 1; }
     /// Largest true distance from the mesh, in voxels, at which a point may be covered (contract clause 2).
     virtual double spillBoundVoxels() const = 0;
     /// Distance in voxels within which the interpolated place may differ from the lattice point (contract

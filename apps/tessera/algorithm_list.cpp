@@ -1,0 +1,78 @@
+#include "algorithm_list.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "registry/registry.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::int64_t kBlocksBytes = std::int64_t(1) << 30;
+constexpr int kSmallestEdge = 32;
+
+Contestant contestantOf(const std::string& entry, const AlgorithmArguments& options) {
+    const std::size_t colon = entry.find(':');
+    Contestant contestant;
+    contestant.label = entry;
+    contestant.resampler = &findResampler(entry.substr(0, colon));
+    contestant.options = bindOptionsFor(*contestant.resampler, options);
+    if (colon == std::string::npos) return contestant;
+    contestant.options.target = entry.substr(colon + 1);
+    const std::vector<std::string> targets = contestant.resampler->targets();
+    if (std::find(targets.begin(), targets.end(), contestant.options.target) == targets.end())
+        throw InputError(fmt::format("--algorithms: {} has no target '{}'; there are: {}",
+                                     contestant.resampler->name(), contestant.options.target,
+                                     fmt::join(targets, ", ")));
+    return contestant;
+}
+
+}  // namespace
+
+BindOptions bindOptionsFor(const Resampler& resampler, const AlgorithmArguments& arguments) {
+    BindOptions options = bindOptions(arguments);
+    // Where every target gives the same bits there are no devices to choose from, and one way to classify.
+    if (resampler.targetsAgree()) {
+        options.target.clear();
+        options.classification = Classification::arithmetic;
+    }
+    const std::vector<SampleFormat> formats = resampler.formats();
+    if (std::find(formats.begin(), formats.end(), options.format) == formats.end())
+        options.format = formats.front();
+    return options;
+}
+
+AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments& options) {
+    AlgorithmList list;
+    if (names.empty()) {
+        for (const Resampler* resampler : resamplers()) {
+            const std::string reason = resampler->unavailableReason();
+            if (reason.empty())
+                list.contestants.push_back(contestantOf(std::string(resampler->name()), options));
+            else
+                list.absent.push_back(fmt::format("{} can't run here: {}", resampler->name(), reason));
+        }
+        return list;
+    }
+    for (std::size_t begin = 0; begin <= names.size();) {
+        const std::size_t end = std::min(names.find(',', begin), names.size());
+        if (end == begin)
+            throw InputError(fmt::format("--algorithms: expected name,name:target,..., got '{}'", names));
+        list.contestants.push_back(contestantOf(names.substr(begin, end - begin), options));
+        begin = end + 1;
+    }
+    return list;
+}
+
+int affordableBoxEdge(int edge, int channels, std::size_t algorithms) {
+    const auto bytes = [&](std::int64_t e) {
+        return e * e * e * (4 * std::int64_t(channels) + 8) * std::int64_t(algorithms);
+    };
+    while (edge / 2 >= kSmallestEdge && bytes(edge) > kBlocksBytes) edge /= 2;
+    return edge;
+}
+
+}  // namespace tessera

@@ -1,0 +1,146 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "algorithm_list.h"
+#include "base/error.h"
+#include "commands.h"
+#include "compare_text.h"
+#include "field_selection.h"
+#include "io/read_mesh.h"
+#include "output_paths.h"
+#include "report_text.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kExitDisagree = 1;
+constexpr const char* kLegend =
+    "holes: well inside an element, not covered. spills: covered, further from the mesh than the algorithm's "
+    "bound. wrong values: explained by no\n"
+    "element there within clause 4 of the contract; 'of allowed' is the largest share of it that a right "
+    "value "
+    "used. undecided: right as far as double\n"
+    "can tell. at the boundary: within 2^-8 voxel of it.\n"
+    "Thick elements: from 1/16 voxel on. In thinner ones a place off by 2^-8 voxel is worth much of the "
+    "element's "
+    "values, so pointwise differences\n"
+    "there can be large, however exact the sampling is. Cell fields jump: on a shared face either element's "
+    "value "
+    "is right.\n";
+
+class CompareRun {
+  public:
+    explicit CompareRun(const CompareArguments& arguments)
+        : arguments_(arguments),
+          list_(listAlgorithms(arguments.algorithms, arguments.algorithm)),
+          session_(arguments.common) {
+        if (arguments.fields.empty()) return;
+        choices_ = parseFields(arguments.fields);
+    }
+
+    int run() {
+        Json meshes = Json::array();
+        if (arguments_.markdown) session_.print(markdownHead());
+        for (const std::string& path : arguments_.meshes) meshes.push_back(compareOn(path));
+        if (!arguments_.markdown) printEnd();
+        Json json{{"schema", 1},
+                  {"program", "tessera"},
+                  {"version", TESSERA_VERSION},
+                  {"command", "compare"},
+                  {"threads", session_.execution.threadCount()},
+                  {"agrees", problems_.empty()},
+                  {"absent", list_.absent},
+                  {"meshes", std::move(meshes)}};
+        if (!arguments_.common.jsonPath.empty()) writeJson(arguments_.common.jsonPath, json);
+        for (const std::string& problem : problems_) session_.warn(problem);
+        return problems_.empty() ? 0 : kExitDisagree;
+    }
+
+  private:
+    Json compareOn(const std::string& path) {
+        const MeshFile file =
+            readMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, session_.execution);
+        const FieldSelection selection = selectFields(file.mesh, choices_);
+        const Box3d bounds = file.mesh.boundsWorld();
+        const SamplingGrid grid = arguments_.spacing ? cubicGridOfSpacing(bounds, *arguments_.spacing)
+                                                     : cubicGrid(bounds, arguments_.resolution.value_or(128));
+        CompareOptions options;
+        options.runs = arguments_.runs;
+        options.boxEdge = affordableBoxEdge(arguments_.boxEdge, selection.channels, list_.contestants.size());
+        const CompareReport report = compareResamplers(file.mesh, selection.fields, list_.contestants, grid,
+                                                       options, session_.execution);
+        const std::string name = std::filesystem::path(path).filename().string();
+        for (const std::string& sentence : disagreements(report)) problems_.push_back(name + ": " + sentence);
+        session_.print(arguments_.markdown
+                           ? markdownRows(name, report)
+                           : importText(path, file.statistics, bounds) + compareText(report) + "\n");
+        Json json{{"input", path}, {"mesh", meshJson(file.statistics, bounds, summarizeFields(file.mesh))}};
+        json.update(compareJson(report));
+        return json;
+    }
+
+    void printEnd() {
+        std::string text = kLegend;
+        text += fmt::format("Times: wall clock, {} threads, median of {} runs; stages may overlap.\n",
+                            session_.execution.threadCount(), arguments_.runs);
+        for (const std::string& sentence : list_.absent) text += sentence + "\n";
+        session_.print(text + (problems_.empty() ? "the algorithms agree\n" : ""));
+    }
+
+    const CompareArguments& arguments_;
+    AlgorithmList list_;
+    Session session_;
+    std::vector<FieldChoice> choices_;
+    std::vector<std::string> problems_;
+};
+
+}  // namespace
+
+void addCompareOptions(CLI::App& command, CompareArguments& a) {
+    command.add_option("mesh", a.meshes, "mesh files")->required();
+    command.add_option(
+        "--algorithms", a.algorithms,
+        "names with commas between them, each with a target if wanted: software,slicing:osmesa; "
+        "the first is what the others are compared with (default: all that can run here)");
+    addBindOptions(command, a.algorithm);
+    auto* resolution =
+        command
+            .add_option("--resolution", a.resolution, "lattice points along the longest axis (default: 128)")
+            ->check(CLI::Range(2, 1 << 20));
+    command.add_option("--spacing", a.spacing, "spacing of the lattice, in world units")
+        ->check(CLI::PositiveNumber)
+        ->excludes(resolution);
+    command.add_option("--field", a.fields, "fields to sample: a,b (default: all)");
+    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    command
+        .add_option("--box", a.boxEdge,
+                    "points along the edge of the boxes sampled at once; smaller ones are taken when many "
+                    "channels need it")
+        ->check(CLI::Range(16, 512))
+        ->capture_default_str();
+    command.add_flag("--markdown", a.markdown, "print one table in Markdown, one row a mesh and algorithm");
+    command.add_option("--time-step", a.timeStep,
+                       "files with several steps: which one, counted from 0 (default: the last)");
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Samples the mesh by each algorithm on one lattice and compares coverage, values and times; checks "
+        "every "
+        "sample against the mesh. Exit\ncode 1 when coverage differs away from the mesh boundary or a sample "
+        "is "
+        "wrong.\n"
+        "Examples:\n  tessera compare mesh.vtu\n"
+        "  tessera compare mesh.vtu --algorithms software,slicing,hybrid --resolution 256 --field pressure\n"
+        "  tessera compare mesh.vtu --algorithms software,slicing --sample-format r8 --json report.json\n"
+        "  tessera compare *.vtu --markdown");
+}
+
+int runCompare(const CompareArguments& arguments) {
+    checkOutputPaths(arguments.meshes, {{"--json", arguments.common.jsonPath}});
+    return CompareRun(arguments).run();
+}
+
+}  // namespace tessera

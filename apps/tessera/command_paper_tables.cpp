@@ -1,0 +1,304 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include "algorithm_list.h"
+#include "base/error.h"
+#include "base/timer.h"
+#include "commands.h"
+#include "compare/run_times.h"
+#include "compare/sampling_grid.h"
+#include "compare_text.h"
+#include "field_selection.h"
+#include "io/read_mesh.h"
+#include "mesh/mirror.h"
+#include "output_paths.h"
+#include "paper_figures.h"
+#include "registry/registry.h"
+#include "report_text.h"
+
+namespace tessera {
+
+namespace {
+
+/// Whole grids up to this many points are sampled as one box, as the paper did; larger ones in parts.
+constexpr std::int64_t kWholeGridPoints = std::int64_t(1) << 24;
+constexpr int kPartEdge = 256;
+/// Beyond this the paper has figures of its software method alone, and so do we.
+constexpr std::int64_t kDeviceGridPoints = std::int64_t(1) << 26;
+
+constexpr const char* kLegend =
+    "Published: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive "
+    "Visualization of "
+    "Unstructured Grids, IEEE\nVisualization 2001, figures 9 to 11 (Athlon 900 MHz, GeForce2 GTS; reading "
+    "slices "
+    "back not included). Their bluntfin had 220K tetrahedra. Not\nprinted: figure 8, whose heat-sink is not "
+    "public. WestSingle and WestM/C are their versions of an earlier method, not part of Tessera.\n"
+    "Here: seconds, wall clock, median of the runs. Ael: active list and generation of polygons or "
+    "instances. "
+    "Rnd: upload and rendering. Back:\nreading back. ToT: everything, reading back included; stages may "
+    "overlap, so "
+    "it can be less than their sum. #Poly: polygons before they are\ngrown; the paper slices along z, "
+    "Tessera along "
+    "the axis with the fewest element-slice pairs. Speed-up: over software, here and as published.\n";
+
+/// Where an algorithm has no figures.
+constexpr const char* kNone = "-";
+
+using Rows = std::vector<std::vector<std::string>>;
+
+struct Measured {
+    std::string target;
+    RunTimes times;
+    double aelMs() const { return times.statistics.binMs + times.statistics.generateMs; }
+    double rndMs() const { return times.statistics.uploadMs + times.statistics.renderMs; }
+    /// A resampler without a device has no stages but the list and the rest.
+    bool isStaged() const { return times.statistics.elementSlicePairs > 0; }
+};
+
+std::string seconds(double ms) {
+    return fmt::format("{:.3f}", ms / 1000);
+}
+std::string published(const std::optional<double>& value) {
+    return value ? fmt::format("{:.2f}", *value) : kNone;
+}
+std::string ratio(double of, double over) {
+    return fmt::format("{:.2f}", of / over);
+}
+
+class PaperTables {
+  public:
+    explicit PaperTables(const PaperTablesArguments& arguments)
+        : arguments_(arguments), session_(arguments.common) {
+        for (const char* name : {"software", "slicing", "hybrid"}) findAlgorithm(name);
+    }
+
+    int run() {
+        MeshFile file = readMesh(arguments_.mesh, {fieldNames(), -1}, session_.execution);
+        field_ = chooseField(file.mesh);
+        session_.print(importText(arguments_.mesh, file.statistics, file.mesh.boundsWorld()) +
+                       fmt::format("  field {}, {} threads, median of {} {}\n",
+                                   file.mesh.fields[std::size_t(field_)].name,
+                                   session_.execution.threadCount(), arguments_.runs,
+                                   arguments_.runs == 1 ? "run" : "runs"));
+        Json sets = Json::array();
+        for (const PaperDataSet& set : paperDataSets()) sets.push_back(runSet(set, file.mesh));
+        std::string end = "\n";
+        end += kLegend;
+        for (const auto& [name, reason] : absent_) end += fmt::format("{} (-): {}\n", name, reason);
+        session_.print(end);
+        if (!arguments_.common.jsonPath.empty())
+            writeJson(arguments_.common.jsonPath, Json{{"schema", 1},
+                                                       {"program", "tessera"},
+                                                       {"version", TESSERA_VERSION},
+                                                       {"command", "paper-tables"},
+                                                       {"input", arguments_.mesh},
+                                                       {"threads", session_.execution.threadCount()},
+                                                       {"runs", arguments_.runs},
+                                                       {"absent", absent_},
+                                                       {"data_sets", std::move(sets)}});
+        return 0;
+    }
+
+  private:
+    /// Algorithms by their names; those that can't run get a reason.
+    void findAlgorithm(const std::string& name) {
+        for (const Resampler* resampler : resamplers()) {
+            if (resampler->name() != name) continue;
+            const std::string reason = resampler->unavailableReason();
+            if (reason.empty())
+                algorithms_.push_back({name, resampler, bindOptionsFor(*resampler, arguments_.algorithm)});
+            else
+                absent_[name] = "can't run here: " + reason;
+            return;
+        }
+        absent_[name] = "this build doesn't have it";
+    }
+
+    std::vector<std::string> fieldNames() const {
+        return arguments_.field.empty() ? std::vector<std::string>{} : std::vector{arguments_.field};
+    }
+    /// The field asked for, or the first scalar one of the points, as the paper resampled.
+    int chooseField(const TetMesh& mesh) const {
+        if (!arguments_.field.empty()) return selectFields(mesh, parseFields(arguments_.field)).fields.at(0);
+        for (std::size_t f = 0; f < mesh.fields.size(); ++f)
+            if (mesh.fields[f].components == 1 && mesh.fields[f].location == FieldLocation::point)
+                return int(f);
+        throw InputError(
+            fmt::format("{}: it has no scalar point field; choose one with --field", arguments_.mesh));
+    }
+
+    Json runSet(const PaperDataSet& set, const TetMesh& original) {
+        TetMesh mesh = original;
+        for (const int axis : set.mirrorAxes)
+            mesh = withMirrorImage(mesh, axis, mesh.boundsWorld().min[axis]);
+        const std::string name =
+            std::string(set.prefix) + std::filesystem::path(arguments_.mesh).stem().string();
+        session_.print(fmt::format("\n{}: {} elements; published in {}: {}K\n", name,
+                                   formatCount(mesh.elementCount()), set.figures, set.elementsK));
+        std::vector<std::unique_ptr<BoundResampler>> bound;
+        const std::vector<int> fields{field_};
+        for (const Contestant& c : algorithms_) bound.push_back(c.resampler->bind(mesh, fields, c.options));
+        Json grids = Json::array();
+        Rows table{{"seconds", "Ael", "Rnd", "Back", "ToT", "#Poly", "a pair", "speed-up", "published", "Ael",
+                    "Rnd", "ToT", "#Poly", "speed-up"}};
+        for (const PaperGrid& grid : set.grids) {
+            if (std::max({grid.points.x, grid.points.y, grid.points.z}) > arguments_.maxSize) continue;
+            grids.push_back(runGrid(grid, mesh, bound, table));
+        }
+        session_.print(formatTable(table));
+        return {{"name", name}, {"elements", mesh.elementCount()}, {"grids", std::move(grids)}};
+    }
+
+    Json runGrid(const PaperGrid& grid, const TetMesh& mesh,
+                 const std::vector<std::unique_ptr<BoundResampler>>& bound, Rows& table) {
+        const SamplingGrid sampling = spanningGrid(mesh.boundsWorld(), grid.points);
+        const bool whole = sampling.points.count() <= kWholeGridPoints;
+        const std::vector<IndexBox> boxes =
+            whole ? std::vector{sampling.points} : cutIntoBoxes(sampling.points, kPartEdge);
+        std::map<std::string, Measured> measured;
+        for (std::size_t a = 0; a < bound.size(); ++a) {
+            const Contestant& c = algorithms_[a];
+            if (!isMeasured(c.label, grid)) continue;
+            measured[c.label] = {
+                std::string(bound[a]->target()),
+                timeRuns(*bound[a], sampling.lattice, boxes, arguments_.runs, session_.execution)};
+        }
+        addRows(grid, measured, table);
+        return gridJson(grid, measured);
+    }
+
+    void addRows(const PaperGrid& grid, const std::map<std::string, Measured>& measured, Rows& table) const {
+        table.push_back({formatGrid(grid.points)});
+        for (const PaperRow& row : paperRows(grid)) {
+            std::vector<std::string> cells = ourCells(std::string(row.algorithm), measured);
+            for (std::string& cell : paperCells(row, grid)) cells.push_back(std::move(cell));
+            table.push_back(std::move(cells));
+        }
+    }
+
+    static bool isMeasured(std::string_view algorithm, const PaperGrid& grid) {
+        return algorithm == "software" ||
+               std::int64_t(grid.points.x) * grid.points.y * grid.points.z <= kDeviceGridPoints;
+    }
+
+    /// The published rows, and one without figures for each algorithm that is measured though it has none.
+    std::vector<PaperRow> paperRows(const PaperGrid& grid) const {
+        std::vector<PaperRow> rows = grid.rows;
+        for (const char* name : {"hybrid", "slicing"}) {
+            const auto isOf = [&](const auto& item) { return item.algorithm == name; };
+            const bool isHere = std::any_of(algorithms_.begin(), algorithms_.end(),
+                                            [&](const Contestant& c) { return c.label == name; });
+            if (isHere && isMeasured(name, grid) && std::none_of(rows.begin(), rows.end(), isOf))
+                rows.insert(rows.begin(), PaperRow{"", name, {}, {}, 0, {}});
+        }
+        return rows;
+    }
+
+    std::vector<std::string> ourCells(const std::string& algorithm,
+                                      const std::map<std::string, Measured>& measured) const {
+        const auto found = measured.find(algorithm);
+        if (found == measured.end())
+            return {algorithm.empty() ? "  -" : "  " + algorithm,
+                    kNone,
+                    kNone,
+                    kNone,
+                    kNone,
+                    kNone,
+                    kNone,
+                    kNone};
+        const Measured& m = found->second;
+        const ResampleStatistics& s = m.times.statistics;
+        const auto software = measured.find("software");
+        const std::string speedUp = software == measured.end() || algorithm == "software"
+                                        ? kNone
+                                        : ratio(software->second.times.totalMs, m.times.totalMs);
+        if (!m.isStaged())
+            return {"  " + algorithm, seconds(s.binMs), kNone, kNone, seconds(m.times.totalMs), kNone, kNone,
+                    speedUp};
+        return {"  " + algorithm,
+                seconds(m.aelMs()),
+                seconds(m.rndMs()),
+                seconds(s.readBackMs),
+                seconds(m.times.totalMs),
+                fmt::format("{:.0f}K", double(s.polygons) / 1000),
+                fmt::format("{:.2f}", double(s.polygons) / double(s.elementSlicePairs)),
+                speedUp};
+    }
+
+    static std::vector<std::string> paperCells(const PaperRow& row, const PaperGrid& grid) {
+        if (row.paperName.empty()) return {kNone, kNone, kNone, kNone, kNone, kNone};
+        std::string speedUp = kNone;
+        for (const PaperRow& other : grid.rows)
+            if (other.algorithm == "software" && row.algorithm != "software")
+                speedUp = ratio(other.totSeconds, row.totSeconds);
+        return {std::string(row.paperName),
+                published(row.aelSeconds),
+                published(row.rndSeconds),
+                published(row.totSeconds),
+                row.polygonsK ? fmt::format("{}K", *row.polygonsK) : kNone,
+                speedUp};
+    }
+
+    static Json gridJson(const PaperGrid& grid, const std::map<std::string, Measured>& measured) {
+        Json ours = Json::object(), theirs = Json::object();
+        for (const auto& [name, m] : measured)
+            ours[name] = {
+                {"target", m.target},
+                {"ael_ms", m.aelMs()},
+                {"rnd_ms", m.isStaged() ? Json(m.rndMs()) : Json(nullptr)},
+                {"read_back_ms", m.isStaged() ? Json(m.times.statistics.readBackMs) : Json(nullptr)},
+                {"total_ms", m.times.totalMs},
+                {"statistics", statisticsJson(m.times.statistics)}};
+        const auto orNull = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };
+        for (const PaperRow& row : grid.rows)
+            theirs[std::string(row.paperName)] = {{"algorithm", row.algorithm},
+                                                  {"ael_s", orNull(row.aelSeconds)},
+                                                  {"rnd_s", orNull(row.rndSeconds)},
+                                                  {"tot_s", row.totSeconds},
+                                                  {"polygons_k", orNull(row.polygonsK)}};
+        return {{"points", {grid.points.x, grid.points.y, grid.points.z}},
+                {"measured", std::move(ours)},
+                {"published", std::move(theirs)}};
+    }
+
+    const PaperTablesArguments& arguments_;
+    Session session_;
+    std::vector<Contestant> algorithms_;
+    std::map<std::string, std::string> absent_;
+    int field_ = -1;
+};
+
+}  // namespace
+
+void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
+    command.add_option("mesh", a.mesh, "mesh file; the paper's is the bluntfin")->required();
+    addBindOptions(command, a.algorithm);
+    command.add_option("--field", a.field,
+                       "the field to sample (default: the first scalar field of the points)");
+    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    command
+        .add_option("--max-size", a.maxSize,
+                    "leave out grids with more points than this along an axis (there are 128 to 1024)")
+        ->check(CLI::Range(128, 1024))
+        ->capture_default_str();
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Times the algorithms on the mesh, its double (mirrored at a plane perpendicular to y) and its "
+        "quadruple (y "
+        "and z), on the grids of Weiler and\nErtl 2001, and prints their figures 9 to 11 beside.\n"
+        "Examples:\n  tessera paper-tables bluntfin.vtu\n"
+        "  tessera paper-tables bluntfin.vtu --classification published --max-size 256 --json tables.json");
+}
+
+int runPaperTables(const PaperTablesArguments& arguments) {
+    checkOutputPaths({arguments.mesh}, {{"--json", arguments.common.jsonPath}});
+    return PaperTables(arguments).run();
+}
+
+}  // namespace tessera

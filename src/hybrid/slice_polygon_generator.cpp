@@ -1,0 +1,125 @@
+#include "hybrid/slice_polygon_generator.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tessera {
+
+namespace {
+
+/// Beyond this, corners lose too much in the rasteriser's fixed point.
+constexpr double kLargestExtent = 1000;
+/// A pixel centre this close to a polygon's bounding rectangle may be covered by it.
+constexpr double kMargin = 0x1p-8;
+/// Rounding of node places in float, for each voxel of size, with room for that of the cut itself.
+constexpr double kPlaceRounding = 0x1p-21;
+
+/// The edges that a plane cuts, for each set of nodes on its upper side (bit k: node k), in order around the
+/// polygon. Edges are pairs of nodes, the lower first.
+struct Cut {
+    int corners;
+    int edge[4][2];
+};
+constexpr Cut kCuts[16] = {{0, {}},
+                           {3, {{0, 1}, {0, 2}, {0, 3}}},
+                           {3, {{0, 1}, {1, 2}, {1, 3}}},
+                           {4, {{0, 2}, {0, 3}, {1, 3}, {1, 2}}},
+                           {3, {{0, 2}, {1, 2}, {2, 3}}},
+                           {4, {{0, 1}, {0, 3}, {2, 3}, {1, 2}}},
+                           {4, {{0, 1}, {1, 3}, {2, 3}, {0, 2}}},
+                           {3, {{0, 3}, {1, 3}, {2, 3}}},
+                           {3, {{0, 3}, {1, 3}, {2, 3}}},
+                           {4, {{0, 1}, {1, 3}, {2, 3}, {0, 2}}},
+                           {4, {{0, 1}, {0, 3}, {2, 3}, {1, 2}}},
+                           {3, {{0, 2}, {1, 2}, {2, 3}}},
+                           {4, {{0, 2}, {0, 3}, {1, 3}, {1, 2}}},
+                           {3, {{0, 1}, {1, 2}, {1, 3}}},
+                           {3, {{0, 1}, {0, 2}, {0, 3}}},
+                           {0, {}}};
+
+struct SlicePolygon {
+    int corners = 0;
+    std::array<double, 2> corner[4];  ///< relative to the element's first voxel
+    double error = 0;                 ///< of a corner's place
+};
+
+/// @param height of the slice over the element's first voxel.
+SlicePolygon cutElement(const SliceElement& e, const SliceAxes& axes, double height, double extent) {
+    double above[4];
+    unsigned set = 0;
+    for (unsigned k = 0; k < 4; ++k) {
+        above[k] = double(e.node[k][axes.l]) - height;
+        if (above[k] >= 0) set |= 1u << k;
+    }
+    const Cut& cut = kCuts[set];
+    SlicePolygon polygon;
+    polygon.corners = cut.corners;
+    for (int c = 0; c < cut.corners; ++c) {
+        const int a = cut.edge[c][0], b = cut.edge[c][1];
+        const double rise = above[a] - above[b];
+        const double share = std::clamp(above[a] / rise, 0.0, 1.0);
+        const double ds = double(e.node[b][axes.s]) - double(e.node[a][axes.s]);
+        const double dt = double(e.node[b][axes.t]) - double(e.node[a][axes.t]);
+        polygon.corner[c] = {double(e.node[a][axes.s]) + share * ds, double(e.node[a][axes.t]) + share * dt};
+        const double run = std::max(std::fabs(ds), std::fabs(dt));
+        polygon.error = std::max(polygon.error,
+                                 std::min(run, kPlaceRounding * (extent + 1) * (1 + run / std::fabs(rise))));
+    }
+    return polygon;
+}
+
+double extentOf(const SliceElement& e) {
+    double extent = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto [low, high] =
+            std::minmax({e.node[0][axis], e.node[1][axis], e.node[2][axis], e.node[3][axis]});
+        extent = std::max(extent, double(high) - double(low));
+    }
+    return extent;
+}
+
+void emitSlice(const SlabInput& input, const SliceElement& e, int layer, double extent, SliceBatch& batch) {
+    const SliceAxes& axes = input.axes;
+    PrimitiveList& list = e.grade == ShapeGrade::easy ? batch.easy : batch.thin;
+    SlicePolygon polygon = cutElement(e, axes, double(layer - e.first[axes.l]), extent);
+    PixelRect rect{e.low[axes.s], e.low[axes.t], e.high[axes.s], e.high[axes.t]};
+    // A plane that only touches the element, within rounding, has no polygon: its whole rectangle is drawn.
+    if (polygon.corners > 0) {
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (int c = 0; c < polygon.corners; ++c)
+            for (std::size_t a = 0; a < 2; ++a) {
+                low[a] = std::min(low[a], polygon.corner[c][a]);
+                high[a] = std::max(high[a], polygon.corner[c][a]);
+            }
+        const double margin = kMargin + polygon.error;
+        const int s0 = int(std::ceil(low[0] - margin)), s1 = int(std::floor(high[0] + margin));
+        const int t0 = int(std::ceil(low[1] - margin)), t1 = int(std::floor(high[1] + margin));
+        rect = {std::max(rect.s0, s0 + e.first[axes.s]), std::max(rect.t0, t0 + e.first[axes.t]),
+                std::min(rect.s1, s1 + e.first[axes.s]), std::min(rect.t1, t1 + e.first[axes.t])};
+        if (rect.s0 > rect.s1 || rect.t0 > rect.t1) return;
+    }
+    ++batch.polygons;
+    if (!e.isSmall && polygon.corners > 0 && polygon.error < kGrowth / 4 && extent <= kLargestExtent) {
+        for (int c = 0; c < polygon.corners; ++c) {
+            polygon.corner[c][0] += e.first[axes.s] + 0.5;
+            polygon.corner[c][1] += e.first[axes.t] + 0.5;
+        }
+        if (emitGrown(std::span(polygon.corner, std::size_t(polygon.corners)), layer, e.record, list)) return;
+    }
+    emitRect(rect, layer, e, list);
+}
+
+}  // namespace
+
+void SlicePolygonGenerator::emit(const SlabInput& input, SliceBatch& batch) const {
+    const int axis = input.axes.l;
+    for (int layer = input.layerBegin; layer < input.layerEnd; ++layer)
+        for (const std::int32_t slot : input.active) {
+            const SliceElement& e = input.elements[std::size_t(slot)];
+            if (layer < e.low[axis] || layer > e.high[axis]) continue;
+            ++batch.pairs;
+            emitSlice(input, e, layer, extentOf(e), batch);
+        }
+}
+
+}  // namespace tessera

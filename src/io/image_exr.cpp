@@ -1,0 +1,107 @@
+#include "io/image_exr.h"
+
+#include <ImathBox.h>
+#include <ImathVec.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfVecAttribute.h>
+
+#include <algorithm>
+#include <set>
+
+#include "base/error.h"
+#include "io/atomic_file.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::size_t kLongestName = 255;  // the format's own bound
+constexpr int kRowsAtOnce = 16;            // what is compressed together
+
+/// OpenEXR's output side over an AtomicFile.
+class AtomicExrStream : public Imf::OStream {
+  public:
+    explicit AtomicExrStream(AtomicFile& file) : Imf::OStream(file.path().c_str()), file_(file) {}
+    void write(const char bytes[], int count) override {
+        file_.writeAt(position_, bytes, std::size_t(count));
+        position_ += count;
+    }
+    std::uint64_t tellp() override { return std::uint64_t(position_); }
+    void seekp(std::uint64_t position) override { position_ = std::int64_t(position); }
+
+  private:
+    AtomicFile& file_;
+    std::int64_t position_ = 0;
+};
+
+void checkImage(const ExrImage& image) {
+    const std::size_t pixels = std::size_t(image.width) * std::size_t(image.height);
+    TESSERA_CHECK(image.width > 0 && image.height > 0, "a picture has pixels");
+    std::set<std::string> names;
+    for (const ExrChannel& channel : image.channels) {
+        TESSERA_CHECK(channel.values.size() == pixels, "a channel has a value for every pixel");
+        if (channel.name.empty() || channel.name.size() > kLongestName ||
+            channel.name.find('\0') != std::string::npos)
+            throw InputError("an EXR channel's name has 1 to " + std::to_string(kLongestName) +
+                             " bytes, got '" + channel.name + "'");
+        if (!names.insert(channel.name).second)
+            throw InputError("two EXR channels would have the name '" + channel.name + "'");
+    }
+}
+
+void addAttribute(Imf::Header& header, const ExrAttribute& attribute) {
+    const auto& [name, value] = attribute;
+    if (const auto* text = std::get_if<std::string>(&value))
+        header.insert(name, Imf::StringAttribute(*text));
+    else if (const auto* number = std::get_if<double>(&value))
+        header.insert(name, Imf::DoubleAttribute(*number));
+    else if (const auto* v = std::get_if<Vec3d>(&value))
+        header.insert(name, Imf::V3dAttribute(Imath::V3d(v->x, v->y, v->z)));
+}
+
+}  // namespace
+
+std::vector<std::string> exrChannelNames(const std::string& field, int components) {
+    if (components == 1) return {field};
+    std::vector<std::string> names;
+    for (int c = 0; c < components; ++c)
+        names.push_back(field + '.' + (components <= 3 ? std::string(1, "xyz"[c]) : std::to_string(c)));
+    return names;
+}
+
+void writeExr(const std::string& path, const ExrImage& image, const Execution& execution) {
+    checkImage(image);
+    AtomicFile file(path);
+    try {
+        Imf::Header header(image.width, image.height);
+        header.compression() = Imf::ZIP_COMPRESSION;
+        for (const ExrAttribute& attribute : image.attributes) addAttribute(header, attribute);
+        Imf::FrameBuffer pixels;
+        for (const ExrChannel& channel : image.channels) {
+            header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
+            // The library's slices are read from here on, whatever their type says.
+            char* values = const_cast<char*>(reinterpret_cast<const char*>(channel.values.data()));
+            pixels.insert(channel.name, Imf::Slice(Imf::FLOAT, values, sizeof(float),
+                                                   sizeof(float) * std::size_t(image.width)));
+        }
+        AtomicExrStream stream(file);
+        Imf::OutputFile output(stream, header);
+        output.setFrameBuffer(pixels);
+        for (int y = 0; y < image.height; y += kRowsAtOnce) {
+            execution.throwIfCancelled();
+            execution.report("write", y, image.height);
+            output.writePixels(std::min(kRowsAtOnce, image.height - y));
+        }
+    } catch (const Iex::BaseExc& error) {
+        throw IoError("can't write " + path + ": " + error.what());
+    }
+    file.commit();
+}
+
+}  // namespace tessera

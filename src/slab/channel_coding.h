@@ -1,0 +1,63 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "mesh/tet_mesh.h"
+#include "resample/resampler.h"
+#include "slab/element_shape.h"
+
+namespace tessera {
+
+/// One component of one field, and how its values stand in a target of the device.
+///
+/// r32f: multiplied by a power of two that brings the largest to about 2^60, so that nothing that matters is
+/// denormal on a device that flushes; exact. Other formats: (value - min) / (max - min) over the finite
+/// values of the whole field.
+class ChannelCoding {
+  public:
+    ChannelCoding(const Field& field, int component, SampleFormat format);
+
+    const Field& field() const { return *field_; }
+    int component() const { return component_; }
+    bool isOfCells() const { return field_->location == FieldLocation::cell; }
+
+    /// @param value finite as a float.
+    double encode(double value) const;
+    float decode(float code) const;
+
+  private:
+    const Field* field_;
+    int component_;
+    SampleFormat format_;
+    int exponent_ = 0;
+    double min_ = 0, width_ = 0;
+    float low_ = 0, high_ = 0;
+};
+
+/// Codes of points that aren't covered, and of covered ones whose value isn't finite. The normalised formats
+/// keep both in a target of their own.
+struct SampleMarks {
+    float uncovered, invalid;
+};
+SampleMarks sampleMarks(SampleFormat format);
+/// r8 and r16: no code is left for the marks.
+inline bool needsCoverageTarget(SampleFormat format) {
+    return format == SampleFormat::r8 || format == SampleFormat::r16;
+}
+
+/// A channel's values over an element: clamp(value + (gradient . (p - base) + start), low, high). As the
+/// shaders read it.
+struct ChannelRecord {
+    float gradient[3];
+    float start;
+    float value, low, high;
+    float unused = 0;
+};
+
+/// @param base relative to the shape's first voxel. Returns false when the device could lose the values to
+/// underflow; the element is then to be treated as hard.
+bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,
+                   const ElementShape& shape, const double (&base)[3], float invalid, ChannelRecord& record);
+
+}  // namespace tessera

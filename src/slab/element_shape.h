@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "base/vec.h"
+#include "mesh/tet_mesh.h"
+#include "software/node_frame.h"
+
+namespace tessera {
+
+/// What arithmetic a fragment needs to decide which points an element covers.
+enum class ShapeGrade : std::uint8_t {
+    easy,  ///< float
+    thin,  ///< double
+    hard,  ///< more than double, or an element of more than kLargestHeight voxels: decided on the processor
+};
+
+/// Heights beyond this leave the range of the depth buffer.
+inline constexpr double kLargestHeight = 2048;
+
+/// An element in the index space of a lattice, relative to its first voxel. Distances are in voxels.
+///
+/// Face j lies opposite node j; its distance at place p is normal[j] . p + offset[j], positive inside. A
+/// point is covered where every distance is at least -slack: no point of the exact element is lost, and no
+/// covered point is further than 2^-9 voxel from the element. Derivation in docs/algorithms.md.
+struct ElementShape {
+    Vec3i first;             ///< lattice index of the first voxel
+    double node[4][3];       ///< relative to `first`, absolute error a few 2^-53 of the size
+    double low[3], high[3];  ///< of the nodes
+    double normal[4][3];     ///< inward, of unit length
+    double offset[4];
+    double height[4];  ///< of node j over face j
+    double slack = 0;  ///< for the grade's arithmetic
+    ShapeGrade grade = ShapeGrade::hard;
+};
+
+/// The points of `box` in the element's bounding box, which is widened by its rounding; empty when none.
+IndexBox pointsAbout(const ElementShape& shape, const IndexBox& box);
+
+/// Sets up an element; only `first`, `node`, `low` and `high` are set for hard ones.
+ElementShape shapeElement(const TetMesh& mesh, const NodeFrame& frame, std::int32_t element);
+
+}  // namespace tessera

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/execution.h"
+#include "slab/channel_coding.h"
+#include "slab/element_shape.h"
+#include "slab/slice_batch.h"
+#include "software/node_frame.h"
+
+namespace tessera {
+
+/// Face distances of an element as the shaders read them; `base` is relative to the region's first point.
+struct EasyGeometry {
+    float normal[3][4];  ///< axis by axis, of the four faces
+    float offset[4];
+    float base[3];
+    float slack;
+};
+struct alignas(32) ThinGeometry {
+    double normal[3][4];
+    double offset[4];
+    float base[3];
+    float slack;
+};
+static_assert(sizeof(EasyGeometry) == 80 && sizeof(ThinGeometry) == 160 && sizeof(ChannelRecord) == 32);
+
+/// Records of one grade, in no order; element i's channels are channels[i * channelCount ...].
+template <class Geometry>
+struct RecordList {
+    std::vector<Geometry> geometry;
+    std::vector<ChannelRecord> channels;
+};
+
+/// What is sampled, and how.
+struct SlabInputs {
+    const TetMesh& mesh;
+    const NodeFrame& frame;
+    std::span<const ChannelCoding> channels;  ///< 0 to 4
+    SampleFormat format = SampleFormat::r32f;
+    SliceAxes axes;
+
+    /// Channels of a record: one even where nothing but coverage is wanted.
+    int recordedChannels() const { return channels.empty() ? 1 : int(channels.size()); }
+};
+
+/// The elements of a region, ready for generators and shaders.
+struct PreparedRegion {
+    IndexBox points;
+    std::vector<SliceElement> elements;  ///< ascending
+    RecordList<EasyGeometry> easy;
+    RecordList<ThinGeometry> thin;
+    std::vector<std::int32_t> hard;  ///< element numbers
+};
+
+/// @param elements those that may reach the region, ascending. The result doesn't depend on threads.
+PreparedRegion prepareRegion(const SlabInputs& inputs, const IndexBox& points,
+                             std::span<const std::int32_t> elements, const Execution& execution);
+
+/// Slabs of `layersASlab` layers and for each the slots of the elements that reach it, ascending: the active
+/// element list of Weiler and Ertl, built by counting.
+struct ActiveElements {
+    int layersASlab = 0;
+    std::vector<std::int64_t> first;  ///< slabs + 1 offsets into `slots`
+    std::vector<std::int32_t> slots;
+
+    std::size_t slabCount() const { return first.size() - 1; }
+    std::span<const std::int32_t> of(std::size_t slab) const {
+        return {slots.data() + first[slab], std::size_t(first[slab + 1] - first[slab])};
+    }
+};
+ActiveElements listActiveElements(const PreparedRegion& region, const SliceAxes& axes, int layersASlab);
+
+/// A lattice point that the processor decided.
+struct DecidedPoint {
+    std::uint16_t s, t;  ///< pixel
+    std::uint32_t layer;
+    float depth;  ///< voxels
+    float codes[4];
+};
+
+/// Samples elements that no shader can decide, by the software resampler's scan.
+std::vector<DecidedPoint> decideHardElements(const SlabInputs& inputs, const PreparedRegion& region,
+                                             const Execution& execution);
+
+/// The slice axis with the fewest pairs of element and slice, over the whole mesh: z unless another is better
+/// by an eighth, since memory runs along x.
+int chooseLayerAxis(const TetMesh& mesh, const NodeFrame& frame, const Execution& execution);
+
+}  // namespace tessera

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "gl/gl_program.h"
+#include "gl/gl_thread.h"
+#include "resample/resampler.h"
+#include "slab/prepared_region.h"
+
+namespace tessera {
+
+/// What the device has measured and counted since SlabDevice::begin().
+struct SlabCounts {
+    double uploadMs = 0, renderMs = 0, readBackMs = 0;
+    std::int64_t fragments = 0, vertices = 0, uploadBytes = 0, readBackBytes = 0;
+};
+
+/// A rendered region: codes of `components` floats a point, pixel by pixel, row by row, layer by layer.
+struct SlabImage {
+    int components = 1;
+    std::vector<float> codes;
+    std::vector<std::uint8_t> coverage;  ///< of the normalised formats: 0, or 1 + a bit a channel not finite
+};
+
+/// Renders the slabs of one region after another into a layered target. All functions but the constructor run
+/// on the device's OpenGL thread; whoever renders holds `exclusive` from the first begin() to the last
+/// readBack().
+class SlabDevice {
+  public:
+    SlabDevice(GlThread& thread);
+
+    GlThread& thread() { return thread_; }
+    std::mutex exclusive;
+
+    /// Clears the target for a region and takes its records. @param axes of the target.
+    void begin(GlContext& context, const PreparedRegion& region, const SlabInputs& inputs);
+    /// Draws what a generator made. Each slice may be drawn by one call only.
+    void draw(GlContext& context, const SliceBatch& batch);
+    void draw(GlContext& context, const std::vector<DecidedPoint>& points);
+    SlabImage readBack(GlContext& context);
+    SlabCounts takeCounts();
+
+    /// Renders layer by layer, as on devices that can't choose a layer in the vertex shader; for tests.
+    void forbidVertexShaderLayer() { isLayered_ = false; }
+
+  private:
+    enum class Stage { sprites, polygons, points };
+    struct Variant {
+        Stage stage;
+        bool isThin;
+        int channels, levels;
+        auto operator<=>(const Variant&) const = default;
+    };
+    struct Target {
+        GlTexture codes, coverage, depth;
+        GlFramebuffer framebuffer;
+        Vec3i size{0};  ///< s, t, layers
+        GLenum format = 0;
+    };
+    /// A ring of persistently mapped buffers that grow: the processor fills one while the device reads
+    /// others.
+    struct Stream {
+        struct Slot {
+            GlBuffer buffer;
+            void* mapped = nullptr;
+            GlFence read;
+        };
+        std::array<Slot, 4> slots;
+        std::size_t next = 0, filled = 0;
+    };
+
+    const GlProgram& program(GlContext& context, const Variant& variant);
+    void prepareTarget(GlContext& context, const Vec3i& size);
+    void clear(GlContext& context);
+    void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
+    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
+                        const std::function<void()>& draw);
+    /// Waits until the device has read what stood there.
+    GLuint upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count);
+    template <class T>
+    GLuint upload(GlContext& context, Stream& stream, const std::vector<T>& items) {
+        return upload(context, stream, items.data(), items.size() * sizeof(T));
+    }
+    /// Marks that the device has been given all its work on what was last uploaded.
+    void release(GlContext& context, Stream& stream);
+
+    GlThread& thread_;
+    bool isLayered_;
+    bool countsFragments_;
+    std::map<Variant, GlProgram> programs_;
+    Target target_;
+    Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, vertices_, indices_;
+    GlVertexArray spriteArray_, polygonArray_, pointArray_;
+    std::vector<GlQuery> timers_, fragmentCounters_;
+    std::size_t usedQueries_ = 0;
+    SlabCounts counts_;
+
+    // Of the present region.
+    SliceAxes axes_;
+    Vec3i size_{0};  ///< s, t, layers
+    int channels_ = 1;
+    SampleFormat format_ = SampleFormat::r32f;
+};
+
+/// The process's device on a platform, made when first asked for; lives until the process ends.
+/// @throws GlError when the platform is not available.
+SlabDevice& sharedSlabDevice(GlPlatform platform);
+
+}  // namespace tessera

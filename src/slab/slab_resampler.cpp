@@ -1,0 +1,343 @@
+#include "slab/slab_resampler.h"
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <future>
+#include <limits>
+#include <mutex>
+#include <optional>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "gl/gl_platform.h"
+#include "resample/check_lattice.h"
+#include "slab/regions.h"
+#include "slab/slab_device.h"
+#include "software/element_bins.h"
+
+namespace tessera {
+
+namespace {
+
+/// What a region may take on the device.
+constexpr std::int64_t kTargetBytes = std::int64_t(160) << 20;
+constexpr int kChannelsAPass = 4;
+
+/// A wanted box being put together from its regions.
+struct OpenBlock {
+    Block block;
+    int partsLeft = 0;
+};
+
+/// A region on its way through the device.
+struct RegionJob {
+    const SlabRegion* region = nullptr;
+    std::vector<PreparedRegion> passes;  ///< one for every group of channels; kept until the device is done
+    std::vector<std::future<void>> draws;
+    std::vector<std::future<SlabImage>> images;
+};
+
+class BoundSlab : public BoundResampler {
+  public:
+    BoundSlab(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
+              GlPlatform platform, const SliceGenerator& generator)
+        : mesh_(mesh),
+          format_(options.format),
+          platform_(platform),
+          target_(nameOf(platform)),
+          generator_(generator) {
+        if (mesh.elementCount() >= std::int64_t(1) << 30)
+            throw InputError("a mesh may have at most 2^30 - 1 elements");
+        for (const int f : fields) {
+            TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
+            const Field& field = mesh.fields[std::size_t(f)];
+            for (int c = 0; c < field.components; ++c) channels_.emplace_back(field, c, format_);
+        }
+    }
+
+    std::string_view target() const override { return target_; }
+
+    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                const BlockSink& sink, const Execution& execution) override {
+        checkLattice(lattice, boxes);
+        SlabDevice& device = sharedSlabDevice(platform_);
+        const std::lock_guard lock(device.exclusive);
+        return Run(*this, device, lattice, boxes, sink, execution).all();
+    }
+
+  private:
+    /// One call of resample().
+    class Run {
+      public:
+        Run(const BoundSlab& bound, SlabDevice& device, const Lattice& lattice,
+            std::span<const IndexBox> boxes, const BlockSink& sink, const Execution& execution)
+            : bound_(bound),
+              device_(device),
+              lattice_(lattice),
+              boxes_(boxes),
+              sink_(sink),
+              execution_(execution) {}
+
+        ResampleStatistics all();
+
+      private:
+        void plan();
+        void start(std::size_t region);
+        void generate(RegionJob& job, const PreparedRegion& prepared, const SlabInputs& inputs);
+        void finishOldest();
+        void copyPart(const SlabRegion& region, const SlabRegion::Part& part,
+                      const std::vector<SlabImage>& images);
+        void copyChannels(const SlabRegion& region, const SlabRegion::Part& part, const SlabImage& image,
+                          std::size_t pass, Block& block, std::int64_t& covered) const;
+        Block& open(std::size_t box);
+        void deliver(std::size_t box);
+        std::span<const ChannelCoding> channelsOf(std::size_t pass) const {
+            const std::size_t from = pass * kChannelsAPass;
+            const std::span all(bound_.channels_);
+            return all.subspan(from, std::min<std::size_t>(kChannelsAPass, all.size() - from));
+        }
+        std::size_t passCount() const {
+            return std::max<std::size_t>(1, (bound_.channels_.size() + kChannelsAPass - 1) / kChannelsAPass);
+        }
+
+        const BoundSlab& bound_;
+        SlabDevice& device_;
+        const Lattice& lattice_;
+        std::span<const IndexBox> boxes_;
+        const BlockSink& sink_;
+        const Execution& execution_;
+
+        NodeFrame frame_;
+        SliceAxes axes_;
+        std::vector<SlabRegion> regions_;
+        std::deque<RegionJob> jobs_;  ///< under way, oldest first; tasks refer to them
+        ElementBins bins_;
+        std::vector<std::unique_ptr<OpenBlock>> blocks_;
+        std::vector<int> partCounts_;
+        ResampleStatistics statistics_;
+        std::mutex mutex_;
+    };
+
+    const TetMesh& mesh_;
+    SampleFormat format_;
+    GlPlatform platform_;
+    std::string target_;
+    const SliceGenerator& generator_;
+    std::vector<ChannelCoding> channels_;
+};
+
+ResampleStatistics BoundSlab::Run::all() {
+    Timer timer;
+    plan();
+    statistics_.binMs = timer.restart();
+    try {
+        for (std::size_t r = 0; r < regions_.size(); ++r) {
+            execution_.throwIfCancelled();
+            // The device draws one region while the processor prepares the next.
+            start(r);
+            if (jobs_.size() > 1) finishOldest();
+            execution_.report("resample", std::int64_t(r) + 1, std::int64_t(regions_.size()));
+        }
+        while (!jobs_.empty()) finishOldest();
+    } catch (...) {
+        // What is queued refers to this call's data: let it pass.
+        device_.thread().run([](GlContext& context) { context.discardFailures(); });
+        throw;
+    }
+    for (std::size_t b = 0; b < boxes_.size(); ++b)
+        if (partCounts_[b] == 0) {
+            open(b);
+            deliver(b);
+        }
+    const SlabCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
+    statistics_.uploadMs = counts.uploadMs;
+    statistics_.renderMs = counts.renderMs;
+    statistics_.readBackMs = counts.readBackMs;
+    statistics_.fragments = counts.fragments;
+    statistics_.vertices = counts.vertices;
+    statistics_.uploadBytes = counts.uploadBytes;
+    statistics_.readBackBytes = counts.readBackBytes;
+    statistics_.sampleMs = timer.elapsedMs();
+    return statistics_;
+}
+
+void BoundSlab::Run::plan() {
+    const std::int64_t channels = std::min<std::int64_t>(4, std::int64_t(bound_.channels_.size()));
+    const std::int64_t bytesAPoint = channels > 1 ? 20 : 8;
+    regions_ = planSlabRegions(boxes_, kTargetBytes / bytesAPoint);
+    blocks_.resize(boxes_.size());
+    partCounts_.assign(boxes_.size(), 0);
+    std::vector<IndexBox> regionBoxes;
+    for (const SlabRegion& region : regions_) {
+        regionBoxes.push_back(region.points);
+        for (const SlabRegion::Part& part : region.parts) ++partCounts_[part.box];
+    }
+    frame_ = frameNodes(bound_.mesh_, lattice_, execution_);
+    axes_ = SliceAxes::along(chooseLayerAxis(bound_.mesh_, frame_, execution_));
+    bins_ = binElements(bound_.mesh_, frame_, regionBoxes, execution_);
+    statistics_.elementBlockPairs = std::int64_t(bins_.elements.size());
+}
+
+void BoundSlab::Run::start(std::size_t region) {
+    RegionJob& job = jobs_.emplace_back();
+    job.region = &regions_[region];
+    job.passes.resize(passCount());
+    for (std::size_t pass = 0; pass < passCount(); ++pass) {
+        const SlabInputs inputs{bound_.mesh_, frame_, channelsOf(pass), bound_.format_, axes_};
+        Timer timer;
+        job.passes[pass] = prepareRegion(inputs, regions_[region].points, bins_.of(region), execution_);
+        statistics_.binMs += timer.elapsedMs();
+        const PreparedRegion& prepared = job.passes[pass];
+        statistics_.exactElements += std::int64_t(prepared.hard.size());
+        job.draws.push_back(device_.thread().post(
+            [this, &prepared, inputs](GlContext& context) { device_.begin(context, prepared, inputs); }));
+        generate(job, prepared, inputs);
+        job.images.push_back(
+            device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
+    }
+}
+
+void BoundSlab::Run::generate(RegionJob& job, const PreparedRegion& prepared, const SlabInputs& inputs) {
+    const Timer timer;
+    const Vec3i size = prepared.points.size();
+    const int layers = size[axes_.l];
+    constexpr int kLayersASlab = 8;
+    const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
+    parallelFor(execution_, std::int64_t(active.slabCount()), [&](std::int64_t i) {
+        const auto slab = std::size_t(i);
+        if (active.of(slab).empty()) return;
+        auto batch = std::make_shared<SliceBatch>();
+        const int first = int(i) * kLayersASlab;
+        bound_.generator_.emit(
+            {axes_, size, first, std::min(first + kLayersASlab, layers), prepared.elements, active.of(slab)},
+            *batch);
+        const std::lock_guard guard(mutex_);
+        statistics_.elementSlicePairs += batch->pairs;
+        statistics_.polygons += batch->polygons;
+        job.draws.push_back(
+            device_.thread().post([this, batch](GlContext& context) { device_.draw(context, *batch); }));
+    });
+    if (!prepared.hard.empty()) {
+        auto points =
+            std::make_shared<std::vector<DecidedPoint>>(decideHardElements(inputs, prepared, execution_));
+        job.draws.push_back(
+            device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
+    }
+    statistics_.generateMs += timer.elapsedMs();
+}
+
+void BoundSlab::Run::finishOldest() {
+    RegionJob& job = jobs_.front();
+    std::vector<SlabImage> images;
+    for (auto& draw : job.draws) draw.get();
+    for (auto& image : job.images) images.push_back(image.get());
+    job.passes.clear();
+    const auto& parts = job.region->parts;
+    parallelFor(execution_, std::int64_t(parts.size()),
+                [&](std::int64_t p) { copyPart(*job.region, parts[std::size_t(p)], images); });
+    jobs_.pop_front();
+}
+
+Block& BoundSlab::Run::open(std::size_t box) {
+    const std::lock_guard lock(mutex_);
+    std::unique_ptr<OpenBlock>& opened = blocks_[box];
+    if (!opened) {
+        opened = std::make_unique<OpenBlock>();
+        Block& block = opened->block;
+        block.lattice = lattice_;
+        block.box = boxes_[box];
+        block.channels = int(bound_.channels_.size());
+        block.values.assign(block.count() * bound_.channels_.size(), 0.0f);
+        block.coverage.assign(block.count(), 0);
+        opened->partsLeft = partCounts_[box];
+    }
+    return opened->block;
+}
+
+void BoundSlab::Run::deliver(std::size_t box) {
+    sink_(box, blocks_[box]->block);
+    blocks_[box].reset();
+}
+
+void BoundSlab::Run::copyPart(const SlabRegion& region, const SlabRegion::Part& part,
+                              const std::vector<SlabImage>& images) {
+    Block& block = open(part.box);
+    std::int64_t covered = 0;
+    for (std::size_t pass = 0; pass < images.size(); ++pass)
+        copyChannels(region, part, images[pass], pass, block, covered);
+    bool isWhole = false;
+    {
+        const std::lock_guard lock(mutex_);
+        statistics_.coveredPoints += covered;
+        isWhole = --blocks_[part.box]->partsLeft == 0;
+    }
+    if (isWhole) deliver(part.box);
+}
+
+void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Part& part,
+                                  const SlabImage& image, std::size_t pass, Block& block,
+                                  std::int64_t& covered) const {
+    const auto codings = channelsOf(pass);
+    const SampleMarks marks = sampleMarks(bound_.format_);
+    const Vec3i size = region.points.size();
+    std::int64_t stride[3];
+    stride[axes_.s] = 1;
+    stride[axes_.t] = size[axes_.s];
+    stride[axes_.l] = std::int64_t(size[axes_.s]) * size[axes_.t];
+    const bool hasCoverage = !image.coverage.empty();
+    Vec3i p = part.points.min;
+    for (p.z = part.points.min.z; p.z < part.points.max.z; ++p.z)
+        for (p.y = part.points.min.y; p.y < part.points.max.y; ++p.y) {
+            const Vec3i at = p - region.points.min;
+            const std::int64_t from = at.x * stride[0] + at.y * stride[1] + at.z * stride[2];
+            const std::size_t to = block.offset(p);
+            const int count = part.points.max.x - part.points.min.x;
+            for (int i = 0; i < count; ++i) {
+                const auto pixel = std::size_t(from + i * stride[0]);
+                const float* codes = image.codes.data() + pixel * std::size_t(image.components);
+                const bool isCovered = hasCoverage ? image.coverage[pixel] != 0 : codes[0] != marks.uncovered;
+                if (!isCovered) continue;
+                block.coverage[to + std::size_t(i)] = 1;
+                covered += pass == 0;
+                for (std::size_t c = 0; c < codings.size(); ++c) {
+                    const bool isInvalid =
+                        hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1 : codes[c] == marks.invalid;
+                    block.values[(pass * kChannelsAPass + c) * block.count() + to + std::size_t(i)] =
+                        isInvalid ? std::numeric_limits<float>::quiet_NaN() : codings[c].decode(codes[c]);
+                }
+            }
+        }
+}
+
+}  // namespace
+
+std::string SlabResampler::unavailableReason() const {
+    if (!availableGlPlatforms().empty()) return {};
+    std::string reasons;
+    for (const GlPlatform platform : glPlatforms())
+        reasons += (reasons.empty() ? "" : "; ") + std::string(nameOf(platform)) + ": " +
+                   tessera::unavailableReason(platform);
+    return "there is no OpenGL 4.5 here (" + reasons + ")";
+}
+
+std::vector<std::string> SlabResampler::targets() const {
+    std::vector<std::string> names;
+    for (const GlPlatform platform : availableGlPlatforms()) names.emplace_back(nameOf(platform));
+    return names;
+}
+
+std::vector<SampleFormat> SlabResampler::formats() const {
+    return {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8};
+}
+
+std::unique_ptr<BoundResampler> SlabResampler::bind(const TetMesh& mesh, std::span<const int> fields,
+                                                    const BindOptions& options) const {
+    if (options.classification != Classification::arithmetic)
+        throw InputError(std::string(name()) + " doesn't offer the published classification");
+    std::optional<GlPlatform> wanted;
+    if (!options.target.empty()) wanted = parseGlPlatform(options.target);
+    return std::make_unique<BoundSlab>(mesh, fields, options, chooseGlPlatform(wanted), generator());
+}
+
+}  // namespace tessera

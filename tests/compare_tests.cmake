@@ -1,0 +1,1 @@
+tessera_test(compare_test LINK compare reference registry)

@@ -1,0 +1,135 @@
+#include "registry/registry.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+/// A resampler that can only be chosen.
+class FakeResampler : public Resampler {
+  public:
+    struct Traits {
+        std::string name;
+        double cost = 1;
+        std::string missing;  // why it can't run
+        std::vector<SampleFormat> formats{SampleFormat::r32f};
+        std::vector<std::string> targets{"default"};
+        bool targetsAgree = true;
+        double placeBound = 0x1p-8;
+    };
+    explicit FakeResampler(Traits traits) : traits_(std::move(traits)) {}
+    std::string_view name() const override { return traits_.name; }
+    std::string_view description() const override { return "for tests"; }
+    std::string unavailableReason() const override { return traits_.missing; }
+    std::vector<std::string> targets() const override { return traits_.targets; }
+    bool targetsAgree() const override { return traits_.targetsAgree; }
+    std::vector<SampleFormat> formats() const override { return traits_.formats; }
+    double relativeCost() const override { return traits_.cost; }
+    double spillBoundVoxels() const override { return 0x1p-8; }
+    double placeBoundVoxels() const override { return traits_.placeBound; }
+    std::unique_ptr<BoundResampler> bind(const TetMesh&, std::span<const int>,
+                                         const BindOptions&) const override {
+        return nullptr;
+    }
+
+  private:
+    Traits traits_;
+};
+
+const FakeResampler plain({.name = "plain"});
+const FakeResampler slow({.name = "slow", .cost = 5});
+const FakeResampler quick({.name = "quick",
+                           .cost = 0.1,
+                           .formats = {SampleFormat::r32f, SampleFormat::r8},
+                           .targets = {"egl-device", "osmesa"},
+                           .targetsAgree = false});
+const FakeResampler absent({.name = "absent", .cost = 0.01, .missing = "no device of that kind"});
+const FakeResampler rough({.name = "rough", .cost = 0.01, .placeBound = 0.25});
+
+ResamplerChoice choose(std::vector<const Resampler*> candidates, std::string_view name,
+                       const BindOptions& options = {}) {
+    return chooseResampler(candidates, name, options);
+}
+
+std::string rejection(const std::vector<const Resampler*>& candidates, std::string_view name,
+                      const BindOptions& options = {}) {
+    try {
+        choose(candidates, name, options);
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    ADD_FAILURE() << "accepted " << name;
+    return {};
+}
+
+bool holds(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+TEST(Registry, NamesAreUniqueAndFoundAgain) {
+    for (const Resampler* resampler : resamplers()) {
+        EXPECT_EQ(&namedResampler(resampler->name()), resampler);
+        EXPECT_EQ(std::count_if(resamplers().begin(), resamplers().end(),
+                                [&](const Resampler* other) { return other->name() == resampler->name(); }),
+                  1);
+        EXPECT_NE(resampler->name(), "auto");
+        EXPECT_GT(resampler->relativeCost(), 0);
+    }
+    EXPECT_THROW(namedResampler("magic"), InputError);
+    EXPECT_THROW(findResampler("magic"), InputError);
+}
+
+TEST(Registry, SoftwareIsThereAndCostsOne) {
+    EXPECT_EQ(chooseResampler("software").resampler, &findResampler("software"));
+    EXPECT_TRUE(chooseResampler("software").reason.empty());
+    EXPECT_EQ(findResampler("software").relativeCost(), 1);
+}
+
+TEST(Registry, AutoTakesTheCheapestThatCanRunAndIsExactEnough) {
+    const ResamplerChoice choice = choose({&plain, &slow, &quick, &absent, &rough}, "auto");
+    EXPECT_EQ(choice.resampler, &quick);
+    EXPECT_TRUE(holds(choice.reason, "auto chose quick")) << choice.reason;
+    EXPECT_TRUE(holds(choice.reason, "plain is slower")) << choice.reason;
+    EXPECT_TRUE(holds(choice.reason, "no device of that kind")) << choice.reason;
+    EXPECT_TRUE(holds(choice.reason, "rough is not exact enough")) << choice.reason;
+    EXPECT_EQ(choose({&slow, &plain}, "auto").resampler, &plain);
+    EXPECT_EQ(choose({&slow, &absent}, "auto").resampler, &slow);
+}
+
+TEST(Registry, AutoHeedsTheOptions) {
+    BindOptions options;
+    options.format = SampleFormat::r8;
+    EXPECT_EQ(choose({&plain, &quick}, "auto", options).resampler, &quick);
+    const std::string none = rejection({&plain, &absent}, "auto", options);
+    EXPECT_TRUE(holds(none, "plain samples in r32f only")) << none;
+    EXPECT_TRUE(holds(none, "no device of that kind")) << none;
+    options = {};
+    options.target = "osmesa";
+    EXPECT_EQ(choose({&plain, &quick}, "auto", options).resampler, &quick);
+    options = {};
+    options.classification = Classification::published;
+    EXPECT_TRUE(holds(rejection({&plain, &quick}, "auto", options), "contract"));
+}
+
+TEST(Registry, ANamedOneMustRunAndHaveTheOptions) {
+    EXPECT_EQ(choose({&plain, &quick}, "plain").resampler, &plain);
+    EXPECT_EQ(choose({&plain, &rough}, "rough").resampler, &rough);
+    EXPECT_TRUE(holds(rejection({&plain, &absent}, "absent"), "no device of that kind"));
+    EXPECT_TRUE(holds(rejection({&plain, &absent}, "magic"), "plain, absent"));
+    BindOptions options;
+    options.format = SampleFormat::r16f;
+    EXPECT_TRUE(holds(rejection({&plain, &quick}, "quick", options), "r32f, r8"));
+    options = {};
+    options.target = "osmesa";
+    EXPECT_TRUE(holds(rejection({&plain, &quick}, "plain", options), "osmesa"));
+    // A device that is missing is for the resampler to explain.
+    options.target = "egl-surfaceless";
+    EXPECT_EQ(choose({&plain, &quick}, "quick", options).resampler, &quick);
+}
+
+}  // namespace
+}  // namespace tessera
