@@ -2,7 +2,7 @@ set(TESSERA_PYTHON /usr/bin/python3 CACHE FILEPATH "Python with Debian's modules
 add_test(NAME layering_test COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.py)
 
 if(TARGET tessera)
-  foreach(suite BadInput FailingOutputs Interruption Reports Slices Series Help)
+  foreach(suite BadInput FailingOutputs Interruption Reports Slices Series Compare Help)
     add_test(NAME app_test.${suite}
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
@@ -19,7 +19,7 @@ endif()
 # What runs under the sanitizers in CI: every layer's own tests, and the contract's; not the long passes over real meshes.
 get_property(tests_here DIRECTORY PROPERTY TESTS)
 list(FILTER tests_here INCLUDE REGEX
-  "^(base|mesh|split|read|software|brick|refine|seams|measure|extend|oracle|contract_checker|contract_format|contract_test|vdb|image)[a-z_]*$")
+  "^(base|gl|mesh|mirror|compare|split|read|software|brick|refine|seams|measure|extend|oracle|contract_checker|contract_format|contract_test|vdb|image)[a-z_]*$")
 set(sanitized_programs "")
 foreach(test IN LISTS tests_here)
   if(TARGET ${test})

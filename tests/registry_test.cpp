@@ -13,9 +13,9 @@ namespace {
 class FakeResampler : public Resampler {
   public:
     struct Traits {
-        std::string name;
+        std::string name{};
         double cost = 1;
-        std::string missing;  // why it can't run
+        std::string missing{};  // why it can't run
         std::vector<SampleFormat> formats{SampleFormat::r32f};
         std::vector<std::string> targets{"default"};
         bool targetsAgree = true;

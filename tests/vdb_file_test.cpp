@@ -42,6 +42,8 @@ TEST_F(VdbFileTest, LevelsRoundTripIsBitExact) {
         const BrickTree tree = result.tree;
         VdbWriteOptions options;
         options.algorithm = "software";
+        options.target = brickCells == 8 ? "" : "osmesa";
+        options.sampleFormat = brickCells == 8 ? "" : "r16f";
         options.criterion = "error 1%";
         options.sourceFile = "mesh \xc3\xa4.vtu";
         const VdbWriteResult written =
@@ -56,6 +58,8 @@ TEST_F(VdbFileTest, LevelsRoundTripIsBitExact) {
         EXPECT_EQ(read.layout, VdbLayout::levels);
         EXPECT_EQ(read.sourceFile, options.sourceFile);
         EXPECT_EQ(read.algorithm, "software");
+        EXPECT_EQ(read.target, options.target);
+        EXPECT_EQ(read.sampleFormat, options.sampleFormat);
         EXPECT_EQ(read.criterion, "error 1%");
         EXPECT_EQ(read.unitScale, 1);
         ASSERT_EQ(read.fields.size(), 3u);

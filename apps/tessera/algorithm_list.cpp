@@ -49,11 +49,11 @@ AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments&
     AlgorithmList list;
     if (names.empty()) {
         for (const Resampler* resampler : resamplers()) {
-            const std::string reason = resampler->unavailableReason();
+            const std::string reason = whyNotBound(*resampler, bindOptionsFor(*resampler, options));
             if (reason.empty())
                 list.contestants.push_back(contestantOf(std::string(resampler->name()), options));
             else
-                list.absent.push_back(fmt::format("{} can't run here: {}", resampler->name(), reason));
+                list.absent.push_back(fmt::format("{} is left out: {}", resampler->name(), reason));
         }
         return list;
     }
@@ -65,6 +65,22 @@ AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments&
         begin = end + 1;
     }
     return list;
+}
+
+std::string whyNotBound(const Resampler& resampler, const BindOptions& options) {
+    const std::string reason = resampler.unavailableReason();
+    if (!reason.empty()) return reason;
+    TetMesh mesh;
+    mesh.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    mesh.tets = {{0, 1, 2, 3}};
+    try {
+        resampler.bind(mesh, {}, options);
+    } catch (const InputError& error) {
+        return error.what();
+    } catch (const GlError& error) {
+        return error.what();
+    }
+    return {};
 }
 
 int affordableBoxEdge(int edge, int channels, std::size_t algorithms) {

@@ -11,7 +11,8 @@ namespace tessera {
 /// Algorithms that a command runs one after the other.
 struct AlgorithmList {
     std::vector<Contestant> contestants;
-    std::vector<std::string> absent;  ///< one sentence for each that can't run here; only when none was named
+    /// One sentence for each that can't run here, or not with the options; only when none was named.
+    std::vector<std::string> absent;
 };
 
 /// "software,slicing:osmesa": names, each with a target of its own if wanted. Empty: every algorithm that can
@@ -21,6 +22,9 @@ AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments&
 
 /// What `resampler` is bound with: the options, as far as it has a choice of them.
 BindOptions bindOptionsFor(const Resampler& resampler, const AlgorithmArguments& options);
+
+/// Why the resampler can't be bound with the options; empty when it can.
+std::string whyNotBound(const Resampler& resampler, const BindOptions& options);
 
 /// `edge` halved until a box of that many points an axis takes at most 1 GiB for all algorithms together.
 int affordableBoxEdge(int edge, int channels, std::size_t algorithms);

@@ -83,8 +83,9 @@ class CompareRun {
 
     void printEnd() {
         std::string text = kLegend;
-        text += fmt::format("Times: wall clock, {} threads, median of {} runs; stages may overlap.\n",
-                            session_.execution.threadCount(), arguments_.runs);
+        text += fmt::format("Times: wall clock, {} threads, median of {} {}; stages may overlap.\n",
+                            session_.execution.threadCount(), arguments_.runs,
+                            arguments_.runs == 1 ? "run" : "runs");
         for (const std::string& sentence : list_.absent) text += sentence + "\n";
         session_.print(text + (problems_.empty() ? "the algorithms agree\n" : ""));
     }

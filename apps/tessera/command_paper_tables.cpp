@@ -88,7 +88,7 @@ class PaperTables {
         for (const PaperDataSet& set : paperDataSets()) sets.push_back(runSet(set, file.mesh));
         std::string end = "\n";
         end += kLegend;
-        for (const auto& [name, reason] : absent_) end += fmt::format("{} (-): {}\n", name, reason);
+        for (const auto& [name, reason] : absent_) end += fmt::format("{} is left out: {}\n", name, reason);
         session_.print(end);
         if (!arguments_.common.jsonPath.empty())
             writeJson(arguments_.common.jsonPath, Json{{"schema", 1},
@@ -108,11 +108,12 @@ class PaperTables {
     void findAlgorithm(const std::string& name) {
         for (const Resampler* resampler : resamplers()) {
             if (resampler->name() != name) continue;
-            const std::string reason = resampler->unavailableReason();
+            const BindOptions options = bindOptionsFor(*resampler, arguments_.algorithm);
+            const std::string reason = whyNotBound(*resampler, options);
             if (reason.empty())
-                algorithms_.push_back({name, resampler, bindOptionsFor(*resampler, arguments_.algorithm)});
+                algorithms_.push_back({name, resampler, options});
             else
-                absent_[name] = "can't run here: " + reason;
+                absent_[name] = reason;
             return;
         }
         absent_[name] = "this build doesn't have it";

@@ -228,16 +228,18 @@ void SlabDevice::drawList(GlContext& context, const PrimitiveList& list, bool is
 }
 
 void SlabDevice::draw(GlContext& context, const SliceBatch& batch) {
+    // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
+    const GlFunctions& gl = context.functions();
     if (usedQueries_ == timers_.size()) {
-        timers_.emplace_back(context, GL_TIME_ELAPSED);
+        timers_.push_back({GlQuery(context, GL_TIMESTAMP), GlQuery(context, GL_TIMESTAMP)});
         if (countsFragments_) fragmentCounters_.emplace_back(context, kFragmentInvocations);
     }
-    timers_[usedQueries_].begin();
+    gl.QueryCounter(timers_[usedQueries_][0].id(), GL_TIMESTAMP);
     if (countsFragments_) fragmentCounters_[usedQueries_].begin();
     drawList(context, batch.easy, false);
     drawList(context, batch.thin, true);
     if (countsFragments_) fragmentCounters_[usedQueries_].end();
-    timers_[usedQueries_].end();
+    gl.QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
     ++usedQueries_;
 }
 
@@ -268,7 +270,7 @@ SlabImage SlabDevice::readBack(GlContext& context) {
     for (Stream* stream : {&easyGeometry_, &easyChannels_, &thinGeometry_, &thinChannels_})
         if (stream->slots[stream->filled].buffer) release(context, *stream);
     for (std::size_t q = 0; q < usedQueries_; ++q) {
-        counts_.renderMs += double(timers_[q].result()) * 1e-6;
+        counts_.renderMs += double(timers_[q][1].result() - timers_[q][0].result()) * 1e-6;
         if (countsFragments_) counts_.fragments += std::int64_t(fragmentCounters_[q].result());
     }
     usedQueries_ = 0;

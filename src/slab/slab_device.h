@@ -98,7 +98,8 @@ class SlabDevice {
     Target target_;
     Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, vertices_, indices_;
     GlVertexArray spriteArray_, polygonArray_, pointArray_;
-    std::vector<GlQuery> timers_, fragmentCounters_;
+    std::vector<std::array<GlQuery, 2>> timers_;
+    std::vector<GlQuery> fragmentCounters_;
     std::size_t usedQueries_ = 0;
     SlabCounts counts_;
 
