@@ -77,7 +77,9 @@ TEST(Registry, NamesAreUniqueAndFoundAgain) {
                                 [&](const Resampler* other) { return other->name() == resampler->name(); }),
                   1);
         EXPECT_NE(resampler->name(), "auto");
-        EXPECT_GT(resampler->relativeCost(), 0);
+        if (resampler->unavailableReason().empty()) {
+            EXPECT_GT(resampler->relativeCost(), 0);
+        }
     }
     EXPECT_THROW(namedResampler("magic"), InputError);
     EXPECT_THROW(findResampler("magic"), InputError);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
+#include <utility>
 
 namespace tessera {
 
@@ -119,6 +121,55 @@ void SlicePolygonGenerator::emit(const SlabInput& input, SliceBatch& batch) cons
             if (layer < e.low[axis] || layer > e.high[axis]) continue;
             ++batch.pairs;
             emitSlice(input, e, layer, extentOf(e), batch);
+        }
+}
+
+namespace {
+
+/// The cut of one edge, computed from the same end by all elements that have the edge, so that neighbours
+/// emit the same bits and the fill rule neither drops nor doubles a pixel between them.
+GouraudCorner cutEdge(const SlabInput& input, std::uint32_t record, int a, int b, int layer) {
+    const PublishedGeometry& geometry = input.published[record];
+    const auto key = [&](int k) {
+        return std::tuple(geometry.node[k][2], geometry.node[k][0], geometry.node[k][1]);
+    };
+    if (key(b) < key(a)) std::swap(a, b);
+    const float* from = geometry.node[a];
+    const float* to = geometry.node[b];
+    const double rise = double(to[2]) - double(from[2]);
+    const double share = rise > 0 ? std::clamp((layer - double(from[2])) / rise, 0.0, 1.0) : 0.0;
+    GouraudCorner corner{float(double(from[0]) + share * (double(to[0]) - double(from[0]))),
+                         float(double(from[1]) + share * (double(to[1]) - double(from[1]))),
+                         std::uint32_t(layer),
+                         {0, 0, 0, 0}};
+    const std::size_t channels = std::size_t(input.channels);
+    for (std::size_t c = 0; c < channels; ++c) {
+        const float* codes = input.nodeCodes[record * channels + c].codes;
+        corner.codes[c] = float(double(codes[a]) + share * (double(codes[b]) - double(codes[a])));
+    }
+    return corner;
+}
+
+}  // namespace
+
+void SlicePolygonGenerator::emitPublished(const SlabInput& input, SliceBatch& batch) const {
+    PublishedList& list = batch.published;
+    for (int layer = input.layerBegin; layer < input.layerEnd; ++layer)
+        for (const std::int32_t slot : input.active) {
+            const SliceElement& e = input.elements[std::size_t(slot)];
+            if (layer < e.low[input.axes.l] || layer > e.high[input.axes.l]) continue;
+            ++batch.pairs;
+            unsigned set = 0;
+            for (unsigned k = 0; k < 4; ++k)
+                if (input.published[e.record].node[k][2] >= float(layer)) set |= 1u << k;
+            const Cut& cut = kCuts[set];
+            if (cut.corners == 0) continue;
+            ++batch.polygons;
+            const auto first = std::uint32_t(list.polygons.size());
+            for (int c = 0; c < cut.corners; ++c)
+                list.polygons.push_back(cutEdge(input, e.record, cut.edge[c][0], cut.edge[c][1], layer));
+            for (std::uint32_t k = 2; k < std::uint32_t(cut.corners); ++k)
+                list.indices.insert(list.indices.end(), {first, first + k - 1, first + k});
         }
 }
 

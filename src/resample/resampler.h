@@ -97,7 +97,8 @@ class Resampler {
     /// Formats it can sample in, the exact one first.
     virtual std::vector<SampleFormat> formats() const { return {SampleFormat::r32f}; }
     /// Time that sampling takes on this machine as a multiple of the software resampler's: a rough guess, for
-    /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow.
+    /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow. Asked
+    /// only when unavailableReason() is empty.
     virtual double relativeCost() const { return 1; }
     /// Largest true distance from the mesh, in voxels, at which a point may be covered (contract clause 2).
     virtual double spillBoundVoxels() const = 0;

@@ -35,8 +35,8 @@ class ChannelCoding {
     float low_ = 0, high_ = 0;
 };
 
-/// Codes of points that aren't covered, and of covered ones whose value isn't finite. The normalised formats
-/// keep both in a target of their own.
+/// Codes of points that aren't covered, and of covered ones whose value isn't finite: this and, where the
+/// device interpolates it, anything above half of it. r8 and r16 keep both in a target of their own.
 struct SampleMarks {
     float uncovered, invalid;
 };

@@ -21,7 +21,8 @@ struct Chunk {
     std::vector<std::int32_t> hard;
 };
 
-/// False when the element holds no lattice point of the region.
+}  // namespace
+
 bool placeInRegion(const ElementShape& shape, const IndexBox& points, SliceElement& e) {
     const IndexBox within = pointsAbout(shape, points);
     if (within.empty()) return false;
@@ -36,6 +37,8 @@ bool placeInRegion(const ElementShape& shape, const IndexBox& points, SliceEleme
     e.grade = shape.grade;
     return true;
 }
+
+namespace {
 
 template <class Geometry>
 void recordGeometry(const ElementShape& shape, const double (&base)[3], const Vec3i& regionMin,

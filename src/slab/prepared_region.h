@@ -53,11 +53,21 @@ struct PreparedRegion {
     RecordList<EasyGeometry> easy;
     RecordList<ThinGeometry> thin;
     std::vector<std::int32_t> hard;  ///< element numbers
+    /// In place of the others for the published methods; elements without volume in double are left out.
+    std::vector<PublishedGeometry> published;
+    std::vector<NodeCodes> nodeCodes;  ///< record by record, channel by channel
 };
+
+/// Sets all of an element but its record. False when it holds no lattice point of the region.
+bool placeInRegion(const ElementShape& shape, const IndexBox& points, SliceElement& e);
 
 /// @param elements those that may reach the region, ascending. The result doesn't depend on threads.
 PreparedRegion prepareRegion(const SlabInputs& inputs, const IndexBox& points,
                              std::span<const std::int32_t> elements, const Execution& execution);
+
+/// The same for the published methods.
+PreparedRegion preparePublishedRegion(const SlabInputs& inputs, const IndexBox& points,
+                                      std::span<const std::int32_t> elements, const Execution& execution);
 
 /// Slabs of `layersASlab` layers and for each the slots of the elements that reach it, ascending: the active
 /// element list of Weiler and Ertl, built by counting.

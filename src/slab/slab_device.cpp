@@ -81,8 +81,14 @@ const GlProgram& SlabDevice::program(GlContext& context, const Variant& variant)
     if (variant.isThin) defines.push_back({"THIN"});
     if (variant.stage == Stage::sprites) defines.push_back({"SPRITE"});
     if (isLayered_) defines.push_back({"LAYERED"});
+    if (variant.stage == Stage::silhouettes) defines.push_back({"SILHOUETTE"});
+    const bool isPublished = variant.stage == Stage::silhouettes || variant.stage == Stage::gouraud;
     GlProgram made =
-        variant.stage == Stage::points
+        isPublished ? makeProgram(context,
+                                  {{GL_VERTEX_SHADER, text::kPublishedVertex},
+                                   {GL_FRAGMENT_SHADER, text::kPublishedFragment, {text::kSampleOutput}}},
+                                  defines)
+        : variant.stage == Stage::points
             ? makeProgram(context,
                           {{GL_VERTEX_SHADER, text::kPointVertex},
                            {GL_FRAGMENT_SHADER, text::kPointFragment, {text::kSampleOutput}}},
@@ -144,6 +150,10 @@ void SlabDevice::begin(GlContext& context, const PreparedRegion& region, const S
         upload(context, easyGeometry_, region.easy.geometry);
         upload(context, easyChannels_, region.easy.channels);
     }
+    if (!region.published.empty()) {
+        upload(context, published_, region.published);
+        upload(context, nodeCodes_, region.nodeCodes);
+    }
     if (!region.thin.geometry.empty()) {
         upload(context, thinGeometry_, region.thin.geometry);
         upload(context, thinChannels_, region.thin.channels);
@@ -161,7 +171,8 @@ void SlabDevice::drawPrimitives(GlContext& context, const Variant& variant, cons
     gl.Viewport(0, 0, room.x, room.y);
     gl.ProgramUniform2f(used.id(), used.uniform("clipFromPixel"), 2.0f / float(room.x), 2.0f / float(room.y));
     gl.ProgramUniform1i(used.id(), used.uniform("layerAxis"), axes_.l);
-    gl.Enable(GL_DEPTH_TEST);
+    const bool isPublished = variant.stage == Stage::silhouettes || variant.stage == Stage::gouraud;
+    if (!isPublished) gl.Enable(GL_DEPTH_TEST);
     gl.DepthFunc(GL_GREATER);
     gl.Enable(GL_PROGRAM_POINT_SIZE);
     gl.ProvokingVertex(GL_FIRST_VERTEX_CONVENTION);
@@ -227,6 +238,58 @@ void SlabDevice::drawList(GlContext& context, const PrimitiveList& list, bool is
     }
 }
 
+void SlabDevice::makeAlphaTexture(GlContext& context) {
+    // Opaque but for a border of one texel, which the lookup is clamped to outside.
+    constexpr int kSize = 66;
+    std::vector<std::uint8_t> alpha(kSize * kSize, 0);
+    for (int y = 1; y + 1 < kSize; ++y)
+        std::fill_n(alpha.begin() + y * kSize + 1, kSize - 2, std::uint8_t(255));
+    alphaTexture_ = GlTexture(context, GL_TEXTURE_2D, GL_R8, kSize, kSize);
+    context.functions().TextureSubImage2D(alphaTexture_.id(), 0, 0, 0, kSize, kSize, GL_RED, GL_UNSIGNED_BYTE,
+                                          alpha.data());
+}
+
+void SlabDevice::drawPublished(GlContext& context, const PublishedList& list) {
+    if (list.indices.empty()) return;
+    const GlFunctions& gl = context.functions();
+    const bool isSilhouette = !list.silhouettes.empty();
+    if (!alphaTexture_) {
+        makeAlphaTexture(context);
+        silhouetteArray_ = GlVertexArray(context);
+        gl.EnableVertexArrayAttrib(silhouetteArray_.id(), 0);
+        gl.VertexArrayAttribIFormat(silhouetteArray_.id(), 0, 2, GL_UNSIGNED_INT, 0);
+        gl.VertexArrayAttribBinding(silhouetteArray_.id(), 0, 0);
+        gouraudArray_ = GlVertexArray(context);
+        const GLuint array = gouraudArray_.id();
+        gl.VertexArrayAttribFormat(array, 0, 2, GL_FLOAT, GL_FALSE, 0);
+        gl.VertexArrayAttribIFormat(array, 1, 1, GL_UNSIGNED_INT, offsetof(GouraudCorner, layer));
+        gl.VertexArrayAttribFormat(array, 2, 4, GL_FLOAT, GL_FALSE, offsetof(GouraudCorner, codes));
+        for (GLuint a = 0; a < 3; ++a) {
+            gl.EnableVertexArrayAttrib(array, a);
+            gl.VertexArrayAttribBinding(array, a, 0);
+        }
+    }
+    const GlVertexArray& array = isSilhouette ? silhouetteArray_ : gouraudArray_;
+    if (isSilhouette) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, published_.slots[published_.filled].buffer.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, nodeCodes_.slots[nodeCodes_.filled].buffer.id());
+        gl.BindTextureUnit(0, alphaTexture_.id());
+        gl.VertexArrayVertexBuffer(array.id(), 0, upload(context, vertices_, list.silhouettes), 0,
+                                   sizeof(SilhouetteCorner));
+    } else {
+        gl.VertexArrayVertexBuffer(array.id(), 0, upload(context, vertices_, list.polygons), 0,
+                                   sizeof(GouraudCorner));
+    }
+    gl.VertexArrayElementBuffer(array.id(), upload(context, indices_, list.indices));
+    drawPrimitives(
+        context, {isSilhouette ? Stage::silhouettes : Stage::gouraud, false, channels_, levelsOf(format_)},
+        array,
+        [&] { gl.DrawElements(GL_TRIANGLES, GLsizei(list.indices.size()), GL_UNSIGNED_INT, nullptr); });
+    counts_.vertices += std::int64_t(list.silhouettes.size() + list.polygons.size());
+    release(context, vertices_);
+    release(context, indices_);
+}
+
 void SlabDevice::draw(GlContext& context, const SliceBatch& batch) {
     // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
     const GlFunctions& gl = context.functions();
@@ -238,6 +301,7 @@ void SlabDevice::draw(GlContext& context, const SliceBatch& batch) {
     if (countsFragments_) fragmentCounters_[usedQueries_].begin();
     drawList(context, batch.easy, false);
     drawList(context, batch.thin, true);
+    drawPublished(context, batch.published);
     if (countsFragments_) fragmentCounters_[usedQueries_].end();
     gl.QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
     ++usedQueries_;
@@ -267,7 +331,8 @@ void SlabDevice::draw(GlContext& context, const std::vector<DecidedPoint>& point
 
 SlabImage SlabDevice::readBack(GlContext& context) {
     const GlFunctions& gl = context.functions();
-    for (Stream* stream : {&easyGeometry_, &easyChannels_, &thinGeometry_, &thinChannels_})
+    for (Stream* stream :
+         {&easyGeometry_, &easyChannels_, &thinGeometry_, &thinChannels_, &published_, &nodeCodes_})
         if (stream->slots[stream->filled].buffer) release(context, *stream);
     for (std::size_t q = 0; q < usedQueries_; ++q) {
         counts_.renderMs += double(timers_[q][1].result() - timers_[q][0].result()) * 1e-6;

@@ -51,7 +51,7 @@ class SlabDevice {
     void forbidVertexShaderLayer() { isLayered_ = false; }
 
   private:
-    enum class Stage { sprites, polygons, points };
+    enum class Stage { sprites, polygons, points, silhouettes, gouraud };
     struct Variant {
         Stage stage;
         bool isThin;
@@ -80,6 +80,8 @@ class SlabDevice {
     void prepareTarget(GlContext& context, const Vec3i& size);
     void clear(GlContext& context);
     void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
+    void drawPublished(GlContext& context, const PublishedList& list);
+    void makeAlphaTexture(GlContext& context);
     void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
                         const std::function<void()>& draw);
     /// Waits until the device has read what stood there.
@@ -96,8 +98,10 @@ class SlabDevice {
     bool countsFragments_;
     std::map<Variant, GlProgram> programs_;
     Target target_;
-    Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, vertices_, indices_;
-    GlVertexArray spriteArray_, polygonArray_, pointArray_;
+    Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, published_, nodeCodes_, vertices_,
+        indices_;
+    GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
+    GlTexture alphaTexture_;
     std::vector<std::array<GlQuery, 2>> timers_;
     std::vector<GlQuery> fragmentCounters_;
     std::size_t usedQueries_ = 0;

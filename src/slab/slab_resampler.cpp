@@ -23,6 +23,8 @@ namespace {
 /// What a region may take on the device.
 constexpr std::int64_t kTargetBytes = std::int64_t(160) << 20;
 constexpr int kChannelsAPass = 4;
+/// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
+constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
 
 /// A wanted box being put together from its regions.
 struct OpenBlock {
@@ -44,6 +46,7 @@ class BoundSlab : public BoundResampler {
               GlPlatform platform, const SliceGenerator& generator)
         : mesh_(mesh),
           format_(options.format),
+          isPublished_(options.classification == Classification::published),
           platform_(platform),
           target_(nameOf(platform)),
           generator_(generator) {
@@ -121,6 +124,7 @@ class BoundSlab : public BoundResampler {
 
     const TetMesh& mesh_;
     SampleFormat format_;
+    bool isPublished_;
     GlPlatform platform_;
     std::string target_;
     const SliceGenerator& generator_;
@@ -186,7 +190,8 @@ void BoundSlab::Run::start(std::size_t region) {
     for (std::size_t pass = 0; pass < passCount(); ++pass) {
         const SlabInputs inputs{bound_.mesh_, frame_, channelsOf(pass), bound_.format_, axes_};
         Timer timer;
-        job.passes[pass] = prepareRegion(inputs, regions_[region].points, bins_.of(region), execution_);
+        const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
+        job.passes[pass] = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
         statistics_.binMs += timer.elapsedMs();
         const PreparedRegion& prepared = job.passes[pass];
         statistics_.exactElements += std::int64_t(prepared.hard.size());
@@ -209,9 +214,19 @@ void BoundSlab::Run::generate(RegionJob& job, const PreparedRegion& prepared, co
         if (active.of(slab).empty()) return;
         auto batch = std::make_shared<SliceBatch>();
         const int first = int(i) * kLayersASlab;
-        bound_.generator_.emit(
-            {axes_, size, first, std::min(first + kLayersASlab, layers), prepared.elements, active.of(slab)},
-            *batch);
+        const SlabInput input{axes_,
+                              size,
+                              first,
+                              std::min(first + kLayersASlab, layers),
+                              prepared.elements,
+                              active.of(slab),
+                              prepared.published,
+                              prepared.nodeCodes,
+                              inputs.recordedChannels()};
+        if (bound_.isPublished_)
+            bound_.generator_.emitPublished(input, *batch);
+        else
+            bound_.generator_.emit(input, *batch);
         const std::lock_guard guard(mutex_);
         statistics_.elementSlicePairs += batch->pairs;
         statistics_.polygons += batch->polygons;
@@ -301,8 +316,8 @@ void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Pa
                 block.coverage[to + std::size_t(i)] = 1;
                 covered += pass == 0;
                 for (std::size_t c = 0; c < codings.size(); ++c) {
-                    const bool isInvalid =
-                        hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1 : codes[c] == marks.invalid;
+                    const bool isInvalid = hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1
+                                                       : codes[c] >= 0.5f * marks.invalid;
                     block.values[(pass * kChannelsAPass + c) * block.count() + to + std::size_t(i)] =
                         isInvalid ? std::numeric_limits<float>::quiet_NaN() : codings[c].decode(codes[c]);
                 }
@@ -321,6 +336,10 @@ std::string SlabResampler::unavailableReason() const {
     return "there is no OpenGL 4.5 here (" + reasons + ")";
 }
 
+double SlabResampler::relativeCost() const {
+    return glDeviceInfo(chooseGlPlatform()).isSoftware ? kEmulatedCost : kDeviceCost;
+}
+
 std::vector<std::string> SlabResampler::targets() const {
     std::vector<std::string> names;
     for (const GlPlatform platform : availableGlPlatforms()) names.emplace_back(nameOf(platform));
@@ -333,8 +352,6 @@ std::vector<SampleFormat> SlabResampler::formats() const {
 
 std::unique_ptr<BoundResampler> SlabResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                     const BindOptions& options) const {
-    if (options.classification != Classification::arithmetic)
-        throw InputError(std::string(name()) + " doesn't offer the published classification");
     std::optional<GlPlatform> wanted;
     if (!options.target.empty()) wanted = parseGlPlatform(options.target);
     return std::make_unique<BoundSlab>(mesh, fields, options, chooseGlPlatform(wanted), generator());

@@ -18,6 +18,7 @@ class SlabResampler : public Resampler {
     std::vector<std::string> targets() const override;
     bool targetsAgree() const override { return false; }
     std::vector<SampleFormat> formats() const override;
+    double relativeCost() const override;
     double spillBoundVoxels() const override { return 0x1p-8; }
     double placeBoundVoxels() const override { return 0x1p-8; }
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,

@@ -7,6 +7,7 @@
 
 #include "base/vec.h"
 #include "slab/element_shape.h"
+#include "slab/published.h"
 
 namespace tessera {
 
@@ -39,25 +40,21 @@ struct PrimitiveList {
     std::vector<Sprite> sprites;
     std::vector<PolygonVertex> vertices;
     std::vector<std::uint32_t> indices;  ///< three a triangle; the first corner provokes
+};
 
-    void clear() {
-        sprites.clear();
-        vertices.clear();
-        indices.clear();
-    }
+/// Triangles of the published methods; one of the two kinds of corners.
+struct PublishedList {
+    std::vector<SilhouetteCorner> silhouettes;
+    std::vector<GouraudCorner> polygons;
+    std::vector<std::uint32_t> indices;
 };
 
 /// What a generator makes for one slab.
 struct SliceBatch {
     PrimitiveList easy, thin;
+    PublishedList published;
     std::int64_t pairs = 0;     ///< of element and slice
     std::int64_t polygons = 0;  ///< before growing
-
-    void clear() {
-        easy.clear();
-        thin.clear();
-        pairs = polygons = 0;
-    }
 };
 
 /// An element as the generators see it: small, because there is one for every element of a region.
@@ -81,6 +78,10 @@ struct SlabInput {
     int layerBegin = 0, layerEnd = 0;
     std::span<const SliceElement> elements;
     std::span<const std::int32_t> active;
+    // For emitPublished.
+    std::span<const PublishedGeometry> published;
+    std::span<const NodeCodes> nodeCodes;  ///< record by record, channel by channel
+    int channels = 1;
 };
 
 /// Turns elements into primitives that hold, at least, every pixel centre the element covers in a slice: the
@@ -89,6 +90,8 @@ class SliceGenerator {
   public:
     virtual ~SliceGenerator() = default;
     virtual void emit(const SlabInput& input, SliceBatch& batch) const = 0;
+    /// The same as published, without growing.
+    virtual void emitPublished(const SlabInput& input, SliceBatch& batch) const = 0;
 };
 
 /// Pixels both inclusive.

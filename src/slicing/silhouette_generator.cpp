@@ -94,4 +94,23 @@ void SilhouetteGenerator::emit(const SlabInput& input, SliceBatch& batch) const 
         }
 }
 
+void SilhouetteGenerator::emitPublished(const SlabInput& input, SliceBatch& batch) const {
+    PublishedList& list = batch.published;
+    for (int layer = input.layerBegin; layer < input.layerEnd; ++layer)
+        for (const std::int32_t slot : input.active) {
+            const SliceElement& e = input.elements[std::size_t(slot)];
+            if (layer < e.low[input.axes.l] || layer > e.high[input.axes.l]) continue;
+            const Silhouette& silhouette = silhouetteOf(e, input.axes);
+            ++batch.pairs;
+            if (silhouette.corners == 0) continue;
+            batch.polygons += silhouette.corners - 2;
+            const auto first = std::uint32_t(list.silhouettes.size());
+            for (int k = 0; k < silhouette.corners; ++k)
+                list.silhouettes.push_back(
+                    {e.record, std::uint16_t(layer), std::uint16_t(silhouette.node[k])});
+            for (std::uint32_t k = 2; k < std::uint32_t(silhouette.corners); ++k)
+                list.indices.insert(list.indices.end(), {first, first + k - 1, first + k});
+        }
+}
+
 }  // namespace tessera

@@ -12,6 +12,8 @@ namespace tessera {
 class SilhouetteGenerator : public SliceGenerator {
   public:
     void emit(const SlabInput& input, SliceBatch& batch) const override;
+    /// Strips of one or two triangles whose corners carry barycentric coordinates.
+    void emitPublished(const SlabInput& input, SliceBatch& batch) const override;
 };
 
 }  // namespace tessera
