@@ -253,6 +253,29 @@ TEST(CheckBounds, FollowTheResampler) {
     }
 }
 
+TEST(CheckBounds, AllowPlacesWithinTheBoundOfDevicesAndNoMore) {
+    TetMesh mesh = boxMesh({.cells = {5, 5, 5}, .jitter = 0.2});
+    addPointField(mesh, "wavy", {wavyField});
+    addElementIdField(mesh, "element");
+    const std::vector<int> fields{0, 1};
+    const IndexBox box{Vec3i(4), Vec3i(28)};  // inside the mesh, so that only values can be wrong
+    const Lattice lattice = Lattice::axisParallel(Vec3d(0), 1.0 / 32);
+    const Oracle oracle(mesh, lattice);
+    const ContractBounds bounds{0x1p-8, 0x1p-8};
+    const ReferenceBlock reference = referenceBlock(oracle, box, {.toleranceVoxels = bounds.spillVoxels});
+    const auto shifted = [&](double voxels) {
+        Lattice other = lattice;
+        other.originWorld += Vec3d(voxels / 32 / std::sqrt(3.0));
+        Block block = resampleBlock(SoftwareResampler(), mesh, fields, other, box);
+        block.lattice = lattice;
+        return checkContract(block, reference, oracle, fields, bounds);
+    };
+    const ContractReport within = shifted(0.45 * 0x1p-8), beyond = shifted(3 * 0x1p-8);
+    EXPECT_TRUE(within.isClean()) << within.summary();
+    EXPECT_GT(within.worstRatio, 0.3);
+    EXPECT_GT(beyond.inaccurate, beyond.points / 2) << beyond.summary();
+}
+
 TEST(CheckContract, ChecksCoverageEverywhereAndValuesAtSomePoints) {
     TetMesh mesh = boxMesh({.cells = {3, 3, 3}, .jitter = 0.2});
     addPointField(mesh, "wavy", {wavyField});

@@ -52,10 +52,18 @@ float ChannelCoding::decode(float code) const {
     return std::clamp(float(min_ + double(code) * width_), low_, high_);
 }
 
+double ChannelCoding::scale() const {
+    return format_ == SampleFormat::r32f ? std::ldexp(1.0, -exponent_) : width_;
+}
+
+double ChannelCoding::offset() const {
+    return format_ == SampleFormat::r32f ? 0.0 : min_;
+}
+
 SampleMarks sampleMarks(SampleFormat format) {
     if (format == SampleFormat::r32f)
-        return {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max()};
-    return {-1.0f, 2.0f};
+        return {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(), 0x1p100f};
+    return {-1.0f, 2.0f, 1.5f};
 }
 
 bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,

@@ -25,6 +25,9 @@ class ChannelCoding {
     /// @param value finite as a float.
     double encode(double value) const;
     float decode(float code) const;
+    /// decode(code) is scale() * code + offset(), then rounded and limited to the field's range.
+    double scale() const;
+    double offset() const;
 
   private:
     const Field* field_;
@@ -35,10 +38,10 @@ class ChannelCoding {
     float low_ = 0, high_ = 0;
 };
 
-/// Codes of points that aren't covered, and of covered ones whose value isn't finite: this and, where the
-/// device interpolates it, anything above half of it. r8 and r16 keep both in a target of their own.
+/// Codes of points that aren't covered, and of covered ones whose value isn't finite: `invalid` or, where the
+/// device interpolates it, anything from `invalidFrom` on. r8 and r16 keep both in a target of their own.
 struct SampleMarks {
-    float uncovered, invalid;
+    float uncovered, invalid, invalidFrom;
 };
 SampleMarks sampleMarks(SampleFormat format);
 /// r8 and r16: no code is left for the marks.

@@ -329,8 +329,7 @@ void SlabDevice::draw(GlContext& context, const std::vector<DecidedPoint>& point
     release(context, vertices_);
 }
 
-SlabImage SlabDevice::readBack(GlContext& context) {
-    const GlFunctions& gl = context.functions();
+void SlabDevice::finishRegion(GlContext& context) {
     for (Stream* stream :
          {&easyGeometry_, &easyChannels_, &thinGeometry_, &thinChannels_, &published_, &nodeCodes_})
         if (stream->slots[stream->filled].buffer) release(context, *stream);
@@ -339,6 +338,11 @@ SlabImage SlabDevice::readBack(GlContext& context) {
         if (countsFragments_) counts_.fragments += std::int64_t(fragmentCounters_[q].result());
     }
     usedQueries_ = 0;
+}
+
+SlabImage SlabDevice::readBack(GlContext& context) {
+    const GlFunctions& gl = context.functions();
+    finishRegion(context);
     const Timer timer;
     SlabImage image;
     image.components = channels_ == 1 ? 1 : 4;
@@ -355,6 +359,34 @@ SlabImage SlabDevice::readBack(GlContext& context) {
     counts_.readBackMs += timer.elapsedMs();
     counts_.readBackBytes += std::int64_t(image.codes.size() * sizeof(float) + image.coverage.size());
     return image;
+}
+
+void SlabDevice::addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format) {
+    const GlFunctions& gl = context.functions();
+    const Vec3i size = glm::max(samples.box.size(), Vec3i(1));
+    DeviceSamples::Group group;
+    group.channels = channels;
+    const int recorded = std::max(1, channels);
+    group.codes = GlTexture(context, GL_TEXTURE_3D, internalFormat(format, recorded), size.x, size.y, size.z);
+    const float mark = sampleMarks(format).uncovered;
+    const float codes[4] = {mark, mark, mark, mark}, zero[4] = {0, 0, 0, 0};
+    gl.ClearTexImage(group.codes.id(), 0, recorded == 1 ? GL_RED : GL_RGBA, GL_FLOAT, codes);
+    if (needsCoverageTarget(format)) {
+        group.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, size.x, size.y, size.z);
+        gl.ClearTexImage(group.coverage.id(), 0, GL_RED, GL_FLOAT, zero);
+    }
+    samples.groups.push_back(std::move(group));
+}
+
+void SlabDevice::copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at) {
+    const GlFunctions& gl = context.functions();
+    const auto copy = [&](const GlTexture& from, const GlTexture& to) {
+        gl.CopyImageSubData(from.id(), GL_TEXTURE_3D, 0, 0, 0, 0, to.id(), GL_TEXTURE_3D, 0, at.x, at.y, at.z,
+                            size_.x, size_.y, size_.z);
+    };
+    copy(target_.codes, samples.groups[group].codes);
+    if (target_.coverage) copy(target_.coverage, samples.groups[group].coverage);
+    finishRegion(context);
 }
 
 SlabCounts SlabDevice::takeCounts() {

@@ -12,6 +12,7 @@
 #include "gl/gl_program.h"
 #include "gl/gl_thread.h"
 #include "resample/resampler.h"
+#include "slab/device_samples.h"
 #include "slab/prepared_region.h"
 
 namespace tessera {
@@ -46,6 +47,11 @@ class SlabDevice {
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);
     SlabImage readBack(GlContext& context);
     SlabCounts takeCounts();
+
+    /// Adds textures for a group of channels to samples whose box is set, without values yet.
+    void addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format);
+    /// Copies the region, rendered with layers along z, to its place in a group.
+    void copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at);
 
     /// Renders layer by layer, as on devices that can't choose a layer in the vertex shader; for tests.
     void forbidVertexShaderLayer() { isLayered_ = false; }
@@ -92,6 +98,8 @@ class SlabDevice {
     }
     /// Marks that the device has been given all its work on what was last uploaded.
     void release(GlContext& context, Stream& stream);
+    /// Collects the queries and gives the records' buffers back.
+    void finishRegion(GlContext& context);
 
     GlThread& thread_;
     bool isLayered_;

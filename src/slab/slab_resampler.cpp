@@ -12,6 +12,7 @@
 #include "base/timer.h"
 #include "gl/gl_platform.h"
 #include "resample/check_lattice.h"
+#include "slab/device_samples.h"
 #include "slab/regions.h"
 #include "slab/slab_device.h"
 #include "software/element_bins.h"
@@ -40,7 +41,7 @@ struct RegionJob {
     std::vector<std::future<SlabImage>> images;
 };
 
-class BoundSlab : public BoundResampler {
+class BoundSlab : public BoundSlabResampler {
   public:
     BoundSlab(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
               GlPlatform platform, const SliceGenerator& generator)
@@ -69,18 +70,35 @@ class BoundSlab : public BoundResampler {
         return Run(*this, device, lattice, boxes, sink, execution).all();
     }
 
+    std::shared_ptr<const DeviceSamples> resampleOnDevice(const Lattice& lattice, const IndexBox& box,
+                                                          const Execution& execution) override {
+        checkLattice(lattice, std::span(&box, 1));
+        SlabDevice& device = sharedSlabDevice(platform_);
+        const std::lock_guard lock(device.exclusive);
+        const std::shared_ptr<DeviceSamples> samples = makeDeviceSamples(device.thread());
+        samples->box = box;
+        samples->marks = sampleMarks(format_);
+        for (const ChannelCoding& coding : channels_)
+            samples->decodings.push_back({coding.scale(), coding.offset()});
+        const BlockSink nobody = [](std::size_t, const Block&) {};
+        Run(*this, device, lattice, std::span(&box, 1), nobody, execution, samples.get()).all();
+        return samples;
+    }
+
   private:
     /// One call of resample().
     class Run {
       public:
         Run(const BoundSlab& bound, SlabDevice& device, const Lattice& lattice,
-            std::span<const IndexBox> boxes, const BlockSink& sink, const Execution& execution)
+            std::span<const IndexBox> boxes, const BlockSink& sink, const Execution& execution,
+            DeviceSamples* kept = nullptr)
             : bound_(bound),
               device_(device),
               lattice_(lattice),
               boxes_(boxes),
               sink_(sink),
-              execution_(execution) {}
+              execution_(execution),
+              kept_(kept) {}
 
         ResampleStatistics all();
 
@@ -110,6 +128,7 @@ class BoundSlab : public BoundResampler {
         std::span<const IndexBox> boxes_;
         const BlockSink& sink_;
         const Execution& execution_;
+        DeviceSamples* kept_;  ///< where samples stay on the device; the sink then gets nothing
 
         NodeFrame frame_;
         SliceAxes axes_;
@@ -133,6 +152,11 @@ class BoundSlab : public BoundResampler {
 
 ResampleStatistics BoundSlab::Run::all() {
     Timer timer;
+    if (kept_)
+        device_.thread().run([&](GlContext& context) {
+            for (std::size_t pass = 0; pass < passCount(); ++pass)
+                device_.addGroup(context, *kept_, int(channelsOf(pass).size()), bound_.format_);
+        });
     plan();
     statistics_.binMs = timer.restart();
     try {
@@ -149,7 +173,7 @@ ResampleStatistics BoundSlab::Run::all() {
         device_.thread().run([](GlContext& context) { context.discardFailures(); });
         throw;
     }
-    for (std::size_t b = 0; b < boxes_.size(); ++b)
+    for (std::size_t b = 0; b < boxes_.size() && !kept_; ++b)
         if (partCounts_[b] == 0) {
             open(b);
             deliver(b);
@@ -178,7 +202,7 @@ void BoundSlab::Run::plan() {
         for (const SlabRegion::Part& part : region.parts) ++partCounts_[part.box];
     }
     frame_ = frameNodes(bound_.mesh_, lattice_, execution_);
-    axes_ = SliceAxes::along(chooseLayerAxis(bound_.mesh_, frame_, execution_));
+    axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(bound_.mesh_, frame_, execution_));
     bins_ = binElements(bound_.mesh_, frame_, regionBoxes, execution_);
     statistics_.elementBlockPairs = std::int64_t(bins_.elements.size());
 }
@@ -198,8 +222,13 @@ void BoundSlab::Run::start(std::size_t region) {
         job.draws.push_back(device_.thread().post(
             [this, &prepared, inputs](GlContext& context) { device_.begin(context, prepared, inputs); }));
         generate(job, prepared, inputs);
-        job.images.push_back(
-            device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
+        if (kept_)
+            job.draws.push_back(device_.thread().post([this, pass, at = region](GlContext& context) {
+                device_.copyTo(context, *kept_, pass, regions_[at].points.min - kept_->box.min);
+            }));
+        else
+            job.images.push_back(
+                device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
     }
 }
 
@@ -248,6 +277,10 @@ void BoundSlab::Run::finishOldest() {
     for (auto& draw : job.draws) draw.get();
     for (auto& image : job.images) images.push_back(image.get());
     job.passes.clear();
+    if (kept_) {
+        jobs_.pop_front();
+        return;
+    }
     const auto& parts = job.region->parts;
     parallelFor(execution_, std::int64_t(parts.size()),
                 [&](std::int64_t p) { copyPart(*job.region, parts[std::size_t(p)], images); });
@@ -316,8 +349,8 @@ void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Pa
                 block.coverage[to + std::size_t(i)] = 1;
                 covered += pass == 0;
                 for (std::size_t c = 0; c < codings.size(); ++c) {
-                    const bool isInvalid = hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1
-                                                       : codes[c] >= 0.5f * marks.invalid;
+                    const bool isInvalid =
+                        hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1 : codes[c] >= marks.invalidFrom;
                     block.values[(pass * kChannelsAPass + c) * block.count() + to + std::size_t(i)] =
                         isInvalid ? std::numeric_limits<float>::quiet_NaN() : codings[c].decode(codes[c]);
                 }
@@ -352,6 +385,12 @@ std::vector<SampleFormat> SlabResampler::formats() const {
 
 std::unique_ptr<BoundResampler> SlabResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                     const BindOptions& options) const {
+    return bindToDevice(mesh, fields, options);
+}
+
+std::unique_ptr<BoundSlabResampler> SlabResampler::bindToDevice(const TetMesh& mesh,
+                                                                std::span<const int> fields,
+                                                                const BindOptions& options) const {
     std::optional<GlPlatform> wanted;
     if (!options.target.empty()) wanted = parseGlPlatform(options.target);
     return std::make_unique<BoundSlab>(mesh, fields, options, chooseGlPlatform(wanted), generator());

@@ -10,6 +10,17 @@
 
 namespace tessera {
 
+struct DeviceSamples;
+
+/// A bound OpenGL resampler: besides, it can leave its samples on the device.
+class BoundSlabResampler : public BoundResampler {
+  public:
+    /// Samples one box into 3D textures of sharedGlThread(of its target's platform), without reading back.
+    /// Throws as resample() does, and GlError when the device has no room.
+    virtual std::shared_ptr<const DeviceSamples> resampleOnDevice(const Lattice& lattice, const IndexBox& box,
+                                                                  const Execution& execution) = 0;
+};
+
 /// What the OpenGL resamplers have in common: regions of a lattice are rendered slice by slice into a layered
 /// target and read back. They differ in the primitives that stand for an element in a slice.
 class SlabResampler : public Resampler {
@@ -23,6 +34,10 @@ class SlabResampler : public Resampler {
     double placeBoundVoxels() const override { return 0x1p-8; }
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
+
+    /// bind() as the type that can leave samples on the device.
+    std::unique_ptr<BoundSlabResampler> bindToDevice(const TetMesh& mesh, std::span<const int> fields,
+                                                     const BindOptions& options = {}) const;
 
   protected:
     virtual const SliceGenerator& generator() const = 0;
