@@ -19,7 +19,7 @@ endif()
 # What runs under the sanitizers in CI: every layer's own tests, and the contract's; not the long passes over real meshes.
 get_property(tests_here DIRECTORY PROPERTY TESTS)
 list(FILTER tests_here INCLUDE REGEX
-  "^(base|gl|mesh|mirror|compare|split|read|software|brick|refine|seams|measure|extend|oracle|contract_checker|contract_format|contract_test|vdb|image)[a-z_]*$")
+  "^(base|gl|mesh|mirror|compare|plane|split|read|software|brick|refine|seams|measure|extend|oracle|contract_checker|contract_format|contract_test|vdb|image)[a-z_]*$")
 set(sanitized_programs "")
 foreach(test IN LISTS tests_here)
   if(TARGET ${test})

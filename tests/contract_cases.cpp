@@ -312,6 +312,7 @@ void addTestFields(TetMesh& mesh) {
     addRandomField(mesh, "huge", FieldLocation::point, 1, 0, 1e30, 52);
     addRandomField(mesh, "tiny", FieldLocation::point, 1, 0, 1e-30, 53);
     addRandomField(mesh, "denormal", FieldLocation::point, 1, 0, 1e-41, 54);
+    addRandomField(mesh, "far below float", FieldLocation::point, 1, 0, 1e-310, 57);
     addHoledCopy(mesh, wavy, "holed", 5);
     addFieldOfManySizes(mesh);
     addFieldBeyondFloat(mesh, mesh.fields[std::size_t(wavy)]);

@@ -48,7 +48,8 @@ std::vector<Subject> subjectsOf(std::span<const Resampler* const> resamplers);
 
 /// A subject's part of the lattices: all, or about half for one that isn't primary.
 bool takes(const Subject& subject, const LatticeCase& at);
-/// The lattices on which bits are compared; fewer on a device, where every run has its price.
+/// The lattices on which bits are compared and real meshes checked; fewer on a device, where every run has
+/// its price.
 bool comparesBits(const Subject& subject, const LatticeCase& at);
 /// Points along the longest side for a subject.
 int pointsFor(const Subject& subject, int points);

@@ -2,11 +2,16 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numeric>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "mesh/tet_mesh.h"
 #include "reference/random.h"
+#include "slab/prepared_region.h"
 
 // Random elements that are hard on rasterisers, for the tests of the OpenGL resamplers' core. They have
 // nothing to do with one another: each is a mesh of its own in the same list.
@@ -58,7 +63,8 @@ class ElementMaker {
                 break;
         }
         const int turn = random_.below(24);
-        for (int k = 3; k > 0; --k) std::swap(nodes[std::size_t(k)], nodes[std::size_t((turn >> k) % (k + 1))]);
+        for (int k = 3; k > 0; --k)
+            std::swap(nodes[std::size_t(k)], nodes[std::size_t((turn >> k) % (k + 1))]);
         return nodes;
     }
 
@@ -148,6 +154,75 @@ inline TetMesh zooMesh(Zoo zoo, int count, std::uint64_t seed, double size, cons
         mesh.tets.push_back({n, n + 1, n + 2, n + 3});
     }
     return mesh;
+}
+
+/// A prepared region whose elements are known by number: they carry it as their one channel.
+class NumberedRegion {
+  public:
+    NumberedRegion(const TetMesh& mesh, const NodeFrame& frame, const IndexBox& box, const SliceAxes& axes)
+        : numbers_{"number", FieldLocation::cell, 1, std::vector<double>(mesh.tets.size())},
+          slices_(mesh.tets.size(), nullptr),
+          isHard_(mesh.tets.size(), 0) {
+        std::iota(numbers_.values.begin(), numbers_.values.end(), 0.0);
+        std::vector<std::int32_t> elements(mesh.tets.size());
+        std::iota(elements.begin(), elements.end(), 0);
+        const ChannelCoding coding(numbers_, 0, SampleFormat::r32f);
+        const SlabInputs inputs{mesh, frame, std::span(&coding, 1), SampleFormat::r32f, axes};
+        region_ = prepareRegion(inputs, box, elements, {.threads = 1});
+        for (const SliceElement& e : region_.elements) {
+            const auto& channels =
+                e.grade == ShapeGrade::easy ? region_.easy.channels : region_.thin.channels;
+            slices_.at(std::size_t(coding.decode(channels.at(e.record).value))) = &e;
+        }
+        for (const std::int32_t element : region_.hard) isHard_[std::size_t(element)] = 1;
+    }
+    NumberedRegion(const NumberedRegion&) = delete;
+
+    const PreparedRegion& region() const { return region_; }
+    /// Null when the element has no record.
+    const SliceElement* find(std::int32_t element) const { return slices_[std::size_t(element)]; }
+    bool isHard(std::int32_t element) const { return isHard_[std::size_t(element)] != 0; }
+
+  private:
+    Field numbers_;
+    PreparedRegion region_;
+    std::vector<const SliceElement*> slices_;
+    std::vector<char> isHard_;
+};
+
+/// Least distance to a face in the order of element_fragment.glsl. @param p relative to the region.
+template <class Geometry>
+double leastDistance(const Geometry& geometry, const Vec3i& p) {
+    using Real = std::remove_cvref_t<decltype(geometry.offset[0])>;
+    Real place[3], least = std::numeric_limits<Real>::infinity();
+    for (int a = 0; a < 3; ++a) place[a] = Real(float(p[a]) - geometry.base[a]);
+    for (int face = 0; face < 4; ++face) {
+        const Real x = geometry.normal[0][face] * place[0], y = geometry.normal[1][face] * place[1],
+                   z = geometry.normal[2][face] * place[2];
+        least = std::min(least, ((x + y) + z) + geometry.offset[face]);
+    }
+    return double(least);
+}
+
+/// What a fragment finds and compares: it is accepted unless the least distance is below -slack.
+struct Fragment {
+    double least, slack;
+    bool isAccepted() const { return !(least < -slack); }
+};
+/// @param p relative to the region.
+inline Fragment fragmentOf(const PreparedRegion& region, const SliceElement& slice, const Vec3i& p) {
+    if (slice.grade == ShapeGrade::easy) {
+        const EasyGeometry& geometry = region.easy.geometry[slice.record];
+        return {leastDistance(geometry, p), double(geometry.slack)};
+    }
+    const ThinGeometry& geometry = region.thin.geometry[slice.record];
+    return {leastDistance(geometry, p), double(geometry.slack)};
+}
+
+/// TESSERA_SLAB_ROUNDS asks for more random elements than a test run has time for.
+inline int rounds(int usual) {
+    const char* text = std::getenv("TESSERA_SLAB_ROUNDS");
+    return usual * std::max(1, text ? std::atoi(text) : 1);
 }
 
 }  // namespace tessera::slabtest

@@ -1,5 +1,7 @@
 // Fragments that are never generated are holes: every lattice point that an element covers must lie in a
-// primitive of the generators, further inside than the rasteriser's snapping can move an edge.
+// primitive of the generators, further inside than the rasteriser's snapping can move an edge. The same holds
+// for the points beside it that the fragment's rule would accept: else it would depend on where a region
+// ends, and on the generator, which of them are covered.
 
 #include <gtest/gtest.h>
 
@@ -17,6 +19,7 @@
 namespace tessera {
 namespace {
 
+using slabtest::rounds;
 using slabtest::Zoo;
 
 /// What a corner may be moved by snapping to 2^-8 pixel, and what clipping and float add, in pixels.
@@ -33,7 +36,8 @@ struct Primitives {
 using ElementLayer = std::tuple<ShapeGrade, std::uint32_t, std::uint32_t>;  // grade, record, layer
 
 void sortPrimitives(const PrimitiveList& list, ShapeGrade grade, std::map<ElementLayer, Primitives>& sorted) {
-    for (const Sprite& sprite : list.sprites) sorted[{grade, sprite.record, sprite.layer}].sprites.push_back(sprite);
+    for (const Sprite& sprite : list.sprites)
+        sorted[{grade, sprite.record, sprite.layer}].sprites.push_back(sprite);
     ASSERT_EQ(list.indices.size() % 3, 0u);
     // Triangles of a fan share their first corner, which provokes; together they are a convex polygon.
     for (std::size_t i = 0; i < list.indices.size();) {
@@ -113,13 +117,13 @@ std::map<ElementLayer, Primitives> generate(const SliceGenerator& generator, con
 }
 
 struct Tally {
-    std::int64_t held = 0, lost = 0;
+    std::int64_t held = 0, lost = 0, beside = 0;
     std::int64_t easy = 0, thin = 0, hard = 0, sprites = 0, polygons = 0;
 };
 
 /// What the shaders need to run safely.
-void expectWithinTarget(const std::map<ElementLayer, Primitives>& sorted, const Vec3i& size, const SliceAxes& axes,
-                        Tally& tally) {
+void expectWithinTarget(const std::map<ElementLayer, Primitives>& sorted, const Vec3i& size,
+                        const SliceAxes& axes, Tally& tally) {
     for (const auto& [key, primitives] : sorted) {
         for (const Sprite& sprite : primitives.sprites) {
             EXPECT_TRUE(sprite.edge >= 1 && sprite.edge <= kSmallExtent + 1) << sprite.edge;
@@ -131,8 +135,8 @@ void expectWithinTarget(const std::map<ElementLayer, Primitives>& sorted, const 
 }
 
 std::string describe(const TetMesh& mesh, std::int32_t element, const Vec3i& p, const SliceAxes& axes) {
-    std::string text = "point " + std::to_string(p.x) + " " + std::to_string(p.y) + " " + std::to_string(p.z) +
-                       ", layers along " + std::to_string(axes.l) + ", nodes";
+    std::string text = "point " + std::to_string(p.x) + " " + std::to_string(p.y) + " " +
+                       std::to_string(p.z) + ", layers along " + std::to_string(axes.l) + ", nodes";
     for (const std::int32_t n : mesh.tets[std::size_t(element)])
         for (int a = 0; a < 3; ++a) {
             char number[40];
@@ -146,25 +150,13 @@ std::string describe(const TetMesh& mesh, std::int32_t element, const Vec3i& p, 
 void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box, Tally& tally) {
     const NodeFrame frame = frameNodes(mesh, lattice, {});
     const Oracle oracle(mesh, lattice);
-    const ReferenceBlock reference = referenceBlock(oracle, box, {.toleranceVoxels = 0x1p-20});
-    // With one channel, each element's own number, records can be told apart.
-    Field ids{"id", FieldLocation::cell, 1, {}};
-    for (std::size_t e = 0; e < mesh.tets.size(); ++e) ids.values.push_back(double(e));
-    std::vector<std::int32_t> elements(mesh.tets.size());
-    for (std::size_t e = 0; e < elements.size(); ++e) elements[e] = std::int32_t(e);
-    const ChannelCoding coding(ids, 0, SampleFormat::r32f);
+    const ReferenceBlock reference = referenceBlock(oracle, box, {.toleranceVoxels = kLargestMargin});
     for (int axis = 0; axis < 3; ++axis) {
         const SliceAxes axes = SliceAxes::along(axis);
-        const SlabInputs inputs{mesh, frame, std::span(&coding, 1), SampleFormat::r32f, axes};
-        const PreparedRegion region = prepareRegion(inputs, box, elements, {.threads = 1});
-        std::vector<const SliceElement*> prepared(mesh.tets.size(), nullptr);
-        for (const SliceElement& e : region.elements) {
-            const auto& channels = e.grade == ShapeGrade::easy ? region.easy.channels : region.thin.channels;
-            prepared.at(std::size_t(coding.decode(channels[e.record].value))) = &e;
+        const slabtest::NumberedRegion numbered(mesh, frame, box, axes);
+        const PreparedRegion& region = numbered.region();
+        for (const SliceElement& e : region.elements)
             ++(e.grade == ShapeGrade::easy ? tally.easy : tally.thin);
-        }
-        std::vector<char> isHard(mesh.tets.size(), 0);
-        for (const std::int32_t element : region.hard) isHard[std::size_t(element)] = 1;
         tally.hard += std::int64_t(region.hard.size());
         const SilhouetteGenerator silhouettes;
         const SlicePolygonGenerator polygons;
@@ -178,11 +170,15 @@ void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box,
                 for (p.y = box.min.y; p.y < box.max.y; ++p.y)
                     for (p.x = box.min.x; p.x < box.max.x; ++p.x, ++offset)
                         for (const Candidate& candidate : reference.candidatesOf(offset)) {
-                            if (!candidate.contains || isHard[std::size_t(candidate.element)]) continue;
-                            const SliceElement* e = prepared[std::size_t(candidate.element)];
+                            if (numbered.isHard(candidate.element)) continue;
+                            const SliceElement* e = numbered.find(candidate.element);
                             const Vec3i at = p - box.min;
+                            const bool isAccepted = e && slabtest::fragmentOf(region, *e, at).isAccepted();
+                            if (!candidate.contains && !isAccepted) continue;
+                            tally.beside += !candidate.contains;
                             const auto found =
-                                e ? sorted.find({e->grade, e->record, std::uint32_t(at[axes.l])}) : sorted.end();
+                                e ? sorted.find({e->grade, e->record, std::uint32_t(at[axes.l])})
+                                  : sorted.end();
                             if (found != sorted.end() && holds(found->second, at[axes.s], at[axes.t])) {
                                 ++tally.held;
                                 continue;
@@ -193,12 +189,6 @@ void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box,
                         }
         }
     }
-}
-
-/// TESSERA_SLAB_ROUNDS asks for more random elements than a test run has time for, and for others.
-int rounds(int usual) {
-    const char* text = std::getenv("TESSERA_SLAB_ROUNDS");
-    return usual * std::max(1, text ? std::atoi(text) : 1);
 }
 
 class GeneratorsOf : public testing::TestWithParam<Zoo> {};
@@ -213,13 +203,13 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsUpToAHundredVoxels) {
             // Elements stick out of the region on all sides.
             const IndexBox box{{-17, 3, -9}, {7, 27, 16}};
             const int count = size > 50 ? 60 : size > 10 ? 250 : 800;
-            checkMesh(slabtest::zooMesh(GetParam(), count, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)), kUnit,
-                      box, tally);
+            checkMesh(
+                slabtest::zooMesh(GetParam(), count, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)),
+                kUnit, box, tally);
         }
-    if (std::getenv("TESSERA_SLAB_ROUNDS")) fprintf(stderr,"held %ld easy %ld thin %ld hard %ld sprites %ld polygons %ld\n",tally.held,tally.easy,tally.thin,tally.hard,tally.sprites,tally.polygons);
     EXPECT_EQ(tally.lost, 0);
     EXPECT_GT(tally.held, 1000);
-    EXPECT_GT(tally.easy + tally.thin, 1000);
+    EXPECT_GT(tally.easy + tally.thin, 300);
     EXPECT_GT(tally.sprites, 100);
     EXPECT_GT(tally.polygons, 100);
 }
@@ -230,10 +220,9 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsLongerThanCells) {
     for (const double size : {300.0, 900.0, 1500.0, 6000.0}) {
         const IndexBox box{{240, -256, 500}, {256, -240, 512}};
         for (int round = 0; round < rounds(2); ++round)
-            checkMesh(slabtest::zooMesh(GetParam(), 60, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)), kUnit,
-                      box, tally);
+            checkMesh(slabtest::zooMesh(GetParam(), 60, ++seed, size, Vec3d(box.min) - 1.0, Vec3d(box.max)),
+                      kUnit, box, tally);
     }
-    if (std::getenv("TESSERA_SLAB_ROUNDS")) fprintf(stderr,"held %ld easy %ld thin %ld hard %ld\n",tally.held,tally.easy,tally.thin,tally.hard);
     EXPECT_EQ(tally.lost, 0);
     EXPECT_GT(tally.held, 50);
 }
@@ -245,8 +234,8 @@ TEST_P(GeneratorsOf, loseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
     const TetMesh mesh = slabtest::zooMesh(GetParam(), 400, seed, 9, Vec3d(-1), Vec3d(20));
     // The same elements, their lattice's index 0 a billion voxels away.
     const int away = 1'000'000'000;
-    checkMesh(mesh, Lattice::axisParallel(Vec3d(-double(away)), 1),
-              {near.min + away, near.max + away}, tally);
+    checkMesh(mesh, Lattice::axisParallel(Vec3d(-double(away)), 1), {near.min + away, near.max + away},
+              tally);
     const Lattice turned{{20, -3, 1}, {-0.6, 0.8, 0.1}, {0.8, 0.5, -0.2}, {0.1, 0.3, 1.9}};
     checkMesh(mesh, turned, {{-2, -2, -2}, {22, 22, 12}}, tally);
     EXPECT_EQ(tally.lost, 0);
@@ -254,7 +243,9 @@ TEST_P(GeneratorsOf, loseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Zoo, GeneratorsOf, testing::ValuesIn(slabtest::kZoo),
-                         [](const testing::TestParamInfo<Zoo>& param) { return std::string(nameOf(param.param)); });
+                         [](const testing::TestParamInfo<Zoo>& param) {
+                             return std::string(nameOf(param.param));
+                         });
 
 }  // namespace
 }  // namespace tessera

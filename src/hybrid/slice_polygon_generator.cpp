@@ -13,8 +13,13 @@ namespace {
 constexpr double kLargestExtent = 1000;
 /// A pixel centre this close to a polygon's bounding rectangle may be covered by it.
 constexpr double kMargin = 0x1p-8;
+/// Polygons that would have to grow by more make way for rectangles.
+constexpr double kMostError = 0x1p-6;
 /// Rounding of node places in float, for each voxel of size, with room for that of the cut itself.
 constexpr double kPlaceRounding = 0x1p-21;
+
+/// Rectangles of more pixels are taken as they are.
+constexpr int kMostTightened = 16;
 
 /// The edges that a plane cuts, for each set of nodes on its upper side (bit k: node k), in order around the
 /// polygon. Edges are pairs of nodes, the lower first.
@@ -42,11 +47,13 @@ constexpr Cut kCuts[16] = {{0, {}},
 struct SlicePolygon {
     int corners = 0;
     std::array<double, 2> corner[4];  ///< relative to the element's first voxel
-    double error = 0;                 ///< of a corner's place
+    double error = 0;                 ///< how far from it an accepted point may lie
 };
 
 /// @param height of the slice over the element's first voxel.
 SlicePolygon cutElement(const SliceElement& e, const SliceAxes& axes, double height, double extent) {
+    // Accepted points lie in an element whose nodes are off by this.
+    const double off = kPlaceRounding * (extent + 1) + double(e.margin);
     double above[4];
     unsigned set = 0;
     for (unsigned k = 0; k < 4; ++k) {
@@ -64,8 +71,7 @@ SlicePolygon cutElement(const SliceElement& e, const SliceAxes& axes, double hei
         const double dt = double(e.node[b][axes.t]) - double(e.node[a][axes.t]);
         polygon.corner[c] = {double(e.node[a][axes.s]) + share * ds, double(e.node[a][axes.t]) + share * dt};
         const double run = std::max(std::fabs(ds), std::fabs(dt));
-        polygon.error = std::max(polygon.error,
-                                 std::min(run, kPlaceRounding * (extent + 1) * (1 + run / std::fabs(rise))));
+        polygon.error = std::max(polygon.error, 2 * std::min(run, off * (1 + run / std::fabs(rise))));
     }
     return polygon;
 }
@@ -78,6 +84,44 @@ double extentOf(const SliceElement& e) {
         extent = std::max(extent, double(high) - double(low));
     }
     return extent;
+}
+
+/// Shrinks a rectangle of few pixels to those that no edge's direction tells apart from the polygon; false
+/// when there are none. @param from the element's first voxel, as a pixel.
+bool tighten(const SlicePolygon& polygon, double margin, const int (&from)[2], PixelRect& rect) {
+    const int width = rect.s1 - rect.s0 + 1, height = rect.t1 - rect.t0 + 1;
+    if (width * height > kMostTightened) return true;
+    double normal[4][2], least[4], most[4];
+    for (int c = 0; c < polygon.corners; ++c) {
+        const auto& a = polygon.corner[c];
+        const auto& b = polygon.corner[(c + 1) % polygon.corners];
+        normal[c][0] = a[1] - b[1];
+        normal[c][1] = b[0] - a[0];
+        least[c] = INFINITY;
+        most[c] = -INFINITY;
+        for (int k = 0; k < polygon.corners; ++k) {
+            const double at = normal[c][0] * polygon.corner[k][0] + normal[c][1] * polygon.corner[k][1];
+            least[c] = std::min(least[c], at);
+            most[c] = std::max(most[c], at);
+        }
+        // At least the margin times the normal's length.
+        const double room = margin * (std::fabs(normal[c][0]) + std::fabs(normal[c][1]));
+        least[c] -= room;
+        most[c] += room;
+    }
+    PixelRect kept{rect.s1 + 1, rect.t1 + 1, rect.s0 - 1, rect.t0 - 1};
+    for (int t = rect.t0; t <= rect.t1; ++t)
+        for (int s = rect.s0; s <= rect.s1; ++s) {
+            bool isOutside = false;
+            for (int c = 0; c < polygon.corners; ++c) {
+                const double at = normal[c][0] * (s - from[0]) + normal[c][1] * (t - from[1]);
+                isOutside |= at < least[c] || at > most[c];
+            }
+            if (isOutside) continue;
+            kept = {std::min(kept.s0, s), std::min(kept.t0, t), std::max(kept.s1, s), t};
+        }
+    rect = kept;
+    return rect.s0 <= rect.s1;
 }
 
 void emitSlice(const SlabInput& input, const SliceElement& e, int layer, double extent, SliceBatch& batch) {
@@ -99,14 +143,17 @@ void emitSlice(const SlabInput& input, const SliceElement& e, int layer, double 
         rect = {std::max(rect.s0, s0 + e.first[axes.s]), std::max(rect.t0, t0 + e.first[axes.t]),
                 std::min(rect.s1, s1 + e.first[axes.s]), std::min(rect.t1, t1 + e.first[axes.t])};
         if (rect.s0 > rect.s1 || rect.t0 > rect.t1) return;
+        if (e.isSmall && !tighten(polygon, margin, {e.first[axes.s], e.first[axes.t]}, rect)) return;
     }
     ++batch.polygons;
-    if (!e.isSmall && polygon.corners > 0 && polygon.error < kGrowth / 4 && extent <= kLargestExtent) {
+    if (!e.isSmall && polygon.corners > 0 && polygon.error < kMostError && extent <= kLargestExtent) {
         for (int c = 0; c < polygon.corners; ++c) {
             polygon.corner[c][0] += e.first[axes.s] + 0.5;
             polygon.corner[c][1] += e.first[axes.t] + 0.5;
         }
-        if (emitGrown(std::span(polygon.corner, std::size_t(polygon.corners)), layer, e.record, list)) return;
+        const double growth = kGrowth + 1.5 * polygon.error;
+        if (emitGrown(std::span(polygon.corner, std::size_t(polygon.corners)), growth, layer, e.record, list))
+            return;
     }
     emitRect(rect, layer, e, list);
 }
@@ -115,12 +162,16 @@ void emitSlice(const SlabInput& input, const SliceElement& e, int layer, double 
 
 void SlicePolygonGenerator::emit(const SlabInput& input, SliceBatch& batch) const {
     const int axis = input.axes.l;
+    static thread_local std::vector<double> extents;
+    extents.clear();
+    for (const std::int32_t slot : input.active)
+        extents.push_back(extentOf(input.elements[std::size_t(slot)]));
     for (int layer = input.layerBegin; layer < input.layerEnd; ++layer)
-        for (const std::int32_t slot : input.active) {
-            const SliceElement& e = input.elements[std::size_t(slot)];
+        for (std::size_t i = 0; i < extents.size(); ++i) {
+            const SliceElement& e = input.elements[std::size_t(input.active[i])];
             if (layer < e.low[axis] || layer > e.high[axis]) continue;
             ++batch.pairs;
-            emitSlice(input, e, layer, extentOf(e), batch);
+            emitSlice(input, e, layer, extents[i], batch);
         }
 }
 

@@ -21,6 +21,11 @@ float asFloat(double value) {
     return float(std::clamp(value, -kMost, kMost));
 }
 
+/// What is zero as a float counts as zero: 1e-60 beside 1 is noise, and not worth the processor's time.
+double nodeCode(const ChannelCoding& coding, double value) {
+    return coding.encode(float(value) == 0 ? 0.0 : value);
+}
+
 }  // namespace
 
 ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat format)
@@ -35,7 +40,11 @@ ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat for
     }
     if (!(low <= high)) return;
     const double most = std::max(std::fabs(low), std::fabs(high));
-    if (most > 0) exponent_ = kLargestExponent - std::ilogb(most);
+    if (most > 0) {
+        const int exponent = kLargestExponent - std::ilogb(most);
+        scale_ = std::ldexp(1.0, exponent);
+        inverseScale_ = std::ldexp(1.0, -exponent);
+    }
     min_ = low;
     width_ = high - low;
     low_ = float(low);
@@ -43,17 +52,12 @@ ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat for
 }
 
 double ChannelCoding::encode(double value) const {
-    if (format_ == SampleFormat::r32f) return std::ldexp(value, exponent_);
+    if (format_ == SampleFormat::r32f) return value * scale_;
     return width_ > 0 ? (value - min_) / width_ : 0.0;
 }
 
-float ChannelCoding::decode(float code) const {
-    if (format_ == SampleFormat::r32f) return float(std::ldexp(double(code), -exponent_));
-    return std::clamp(float(min_ + double(code) * width_), low_, high_);
-}
-
 double ChannelCoding::scale() const {
-    return format_ == SampleFormat::r32f ? std::ldexp(1.0, -exponent_) : width_;
+    return format_ == SampleFormat::r32f ? inverseScale_ : width_;
 }
 
 double ChannelCoding::offset() const {
@@ -66,14 +70,25 @@ SampleMarks sampleMarks(SampleFormat format) {
     return {-1.0f, 2.0f, 1.5f};
 }
 
-bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,
+bool isSafeOnDevice(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element) {
+    if (coding.isOfCells()) return true;
+    double most = 0;
+    for (const std::int32_t node : mesh.tets[std::size_t(element)]) {
+        const double value = coding.field().at(node, coding.component());
+        if (!isFloat(value)) return true;
+        most = std::max(most, std::fabs(nodeCode(coding, value)));
+    }
+    return most == 0 || most >= kSmallestCode;
+}
+
+void recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,
                    const ElementShape& shape, const double (&base)[3], float invalid, ChannelRecord& record) {
     record = {};
     const auto keep = [&](double code) { record.value = record.low = record.high = float(code); };
     if (coding.isOfCells()) {
         const double value = coding.field().at(element, coding.component());
         keep(isFloat(value) ? coding.encode(double(float(value))) : double(invalid));
-        return true;
+        return;
     }
     const auto& tet = mesh.tets[std::size_t(element)];
     double codes[4];
@@ -83,9 +98,9 @@ bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_
         const double value = coding.field().at(tet[k], coding.component());
         if (!isFloat(value)) {
             keep(double(invalid));
-            return true;
+            return;
         }
-        codes[k] = coding.encode(value);
+        codes[k] = nodeCode(coding, value);
         // The range is that of the values as floats.
         const auto rounded = float(coding.encode(double(float(value))));
         record.low = std::min(record.low, rounded);
@@ -104,9 +119,6 @@ bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_
     for (int a = 0; a < 3; ++a) record.gradient[a] = asFloat(gradient[a]);
     record.start = asFloat(start);
     record.value = float(codes[0]);
-    const double most =
-        std::max({std::fabs(codes[0]), std::fabs(codes[1]), std::fabs(codes[2]), std::fabs(codes[3])});
-    return most == 0 || most >= kSmallestCode;
 }
 
 }  // namespace tessera

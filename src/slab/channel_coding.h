@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,10 @@ class ChannelCoding {
 
     /// @param value finite as a float.
     double encode(double value) const;
-    float decode(float code) const;
+    float decode(float code) const {
+        if (format_ == SampleFormat::r32f) return float(double(code) * inverseScale_);
+        return std::clamp(float(min_ + double(code) * width_), low_, high_);
+    }
     /// decode(code) is scale() * code + offset(), then rounded and limited to the field's range.
     double scale() const;
     double offset() const;
@@ -33,7 +37,7 @@ class ChannelCoding {
     const Field* field_;
     int component_;
     SampleFormat format_;
-    int exponent_ = 0;
+    double scale_ = 1, inverseScale_ = 1;  ///< of r32f: powers of two
     double min_ = 0, width_ = 0;
     float low_ = 0, high_ = 0;
 };
@@ -58,9 +62,12 @@ struct ChannelRecord {
     float unused = 0;
 };
 
-/// @param base relative to the shape's first voxel. Returns false when the device could lose the values to
-/// underflow; the element is then to be treated as hard.
-bool recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,
+/// False when the device could lose a channel's values over an element to underflow; the element is then to
+/// be treated as hard, in all channels of a run alike.
+bool isSafeOnDevice(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element);
+
+/// @param base relative to the shape's first voxel.
+void recordChannel(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element,
                    const ElementShape& shape, const double (&base)[3], float invalid, ChannelRecord& record);
 
 }  // namespace tessera

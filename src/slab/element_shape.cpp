@@ -10,8 +10,6 @@ namespace tessera {
 
 namespace {
 
-/// Covered points lie within this of their element, in voxels; the contract allows twice as much.
-constexpr double kSpillBound = 0x1p-9;
 /// Rounding of a distance in a fragment, for each voxel of the reach of its arithmetic: coefficients,
 /// products and sums of three terms in float.
 constexpr double kFloatRounding = 0x1p-20;
@@ -73,23 +71,26 @@ double setUpFaces(ElementShape& shape) {
 /// tetrahedron, without bound in thin ones. The moved planes bound the convex hull of the moved corners, so
 /// no point between them is further from the element.
 double cornerReach(const ElementShape& shape) {
+    double inverse[4];
+    for (int j = 0; j < 4; ++j) inverse[j] = 1 / shape.height[j];
     double most = 0;
     for (int i = 0; i < 4; ++i) {
         double moved[3] = {0, 0, 0};
         for (int j = 0; j < 4; ++j)
-            for (int a = 0; a < 3; ++a) moved[a] += (shape.node[i][a] - shape.node[j][a]) / shape.height[j];
-        most = std::max(most, lengthOf(moved));
+            for (int a = 0; a < 3; ++a) moved[a] += (shape.node[i][a] - shape.node[j][a]) * inverse[j];
+        most = std::max(most, moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]);
     }
-    return most;
+    return std::sqrt(most);
 }
 
 }  // namespace
 
 IndexBox pointsAbout(const ElementShape& shape, const IndexBox& box) {
     IndexBox points;
+    const double room = kBoxSlack + shape.margin;
     for (int a = 0; a < 3; ++a) {
-        const double low = double(shape.first[a]) + std::ceil(shape.low[a] - kBoxSlack);
-        const double high = double(shape.first[a]) + std::floor(shape.high[a] + kBoxSlack);
+        const double low = double(shape.first[a]) + std::ceil(shape.low[a] - room);
+        const double high = double(shape.first[a]) + std::floor(shape.high[a] + room);
         points.min[a] = int(std::clamp(low, double(box.min[a]), double(box.max[a])));
         points.max[a] = int(std::clamp(high + 1, double(box.min[a]), double(box.max[a])));
     }
@@ -111,13 +112,14 @@ ElementShape shapeElement(const TetMesh& mesh, const NodeFrame& frame, std::int3
     const double arm = std::min(size, double(kCellEdge)) + 1;
     const double inFloat = kFloatRounding * arm + 0x1p-23 * farthest + planeError;
     const double inDouble = 2 * planeError;
-    if (2 * inFloat * reach <= kSpillBound) {
+    if (2 * inFloat * reach <= kLargestMargin) {
         shape.grade = ShapeGrade::easy;
         shape.slack = inFloat;
-    } else if (2 * inDouble * reach <= kSpillBound) {
+    } else if (2 * inDouble * reach <= kLargestMargin) {
         shape.grade = ShapeGrade::thin;
         shape.slack = inDouble;
     }
+    shape.margin = 2 * shape.slack * reach;
     return shape;
 }
 

@@ -32,10 +32,17 @@ struct ElementShape {
     double offset[4];
     double height[4];  ///< of node j over face j
     double slack = 0;  ///< for the grade's arithmetic
+    /// An accepted point is within this of the element: what looks for points must look as far, or the bits
+    /// would depend on where regions end.
+    double margin = 0;
     ShapeGrade grade = ShapeGrade::hard;
 };
 
-/// The points of `box` in the element's bounding box, which is widened by its rounding; empty when none.
+/// Largest ElementShape::margin, in voxels; the contract allows twice as much.
+inline constexpr double kLargestMargin = 0x1p-9;
+
+/// The points of `box` in the element's bounding box, which is widened by its rounding and `margin`; empty
+/// when none.
 IndexBox pointsAbout(const ElementShape& shape, const IndexBox& box);
 
 /// Sets up an element; only `first`, `node`, `low` and `high` are set for hard ones.

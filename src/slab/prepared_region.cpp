@@ -19,7 +19,11 @@ struct Chunk {
     RecordList<EasyGeometry> easy;
     RecordList<ThinGeometry> thin;
     std::vector<std::int32_t> hard;
+    std::int64_t emptyPairs = 0;
 };
+
+/// Boxes of more points than this are taken as they are.
+constexpr int kMostTightened = 216;
 
 }  // namespace
 
@@ -35,6 +39,7 @@ bool placeInRegion(const ElementShape& shape, const IndexBox& points, SliceEleme
         for (int k = 0; k < 4; ++k) e.node[k][a] = float(shape.node[k][a]);
     }
     e.grade = shape.grade;
+    e.margin = float(shape.margin);
     return true;
 }
 
@@ -66,18 +71,55 @@ bool recordElement(const SlabInputs& inputs, std::int32_t element, const Element
     const Vec3i cell = cellOrigin(points);
     double base[3];
     for (int a = 0; a < 3; ++a) base[a] = std::max(0.0, double(cell[a]) - double(shape.first[a]));
-    const std::size_t channelsBefore = list.channels.size();
+    // Passes must not disagree about who decides, or the channels of a point could be of different elements.
+    for (const ChannelCoding& coding : inputs.allChannels.empty() ? inputs.channels : inputs.allChannels)
+        if (!isSafeOnDevice(coding, inputs.mesh, element)) return false;
     const float invalid = sampleMarks(inputs.format).invalid;
-    for (const ChannelCoding& coding : inputs.channels) {
-        if (recordChannel(coding, inputs.mesh, element, shape, base, invalid, list.channels.emplace_back()))
-            continue;
-        list.channels.resize(channelsBefore);
-        return false;
-    }
+    for (const ChannelCoding& coding : inputs.channels)
+        recordChannel(coding, inputs.mesh, element, shape, base, invalid, list.channels.emplace_back());
     if (inputs.channels.empty()) list.channels.push_back({});
     e.record = std::uint32_t(list.geometry.size());
     recordGeometry(shape, base, points.min, list.geometry.emplace_back());
     return true;
+}
+
+/// Shrinks the box of an element with few points to those it may cover; false when there are none. Tells
+/// only points apart from which every arithmetic of a fragment is sure that they are outside.
+bool tighten(const ElementShape& shape, const Vec3i& regionMin, SliceElement& e) {
+    const int size[3] = {e.high[0] - e.low[0] + 1, e.high[1] - e.low[1] + 1, e.high[2] - e.low[2] + 1};
+    if (shape.grade == ShapeGrade::hard || size[0] * size[1] * size[2] > kMostTightened) return true;
+    double corner[3];
+    for (int a = 0; a < 3; ++a) corner[a] = double(regionMin[a]) + e.low[a] - double(shape.first[a]);
+    double atCorner[4];
+    for (int f = 0; f < 4; ++f)
+        atCorner[f] = shape.offset[f] + shape.normal[f][0] * corner[0] + shape.normal[f][1] * corner[1] +
+                      shape.normal[f][2] * corner[2] + 4 * shape.slack;
+    double rowRise[4];  // the most that a distance gains along a row
+    for (int f = 0; f < 4; ++f) rowRise[f] = std::max(0.0, shape.normal[f][0] * (size[0] - 1));
+    int low[3] = {size[0], size[1], size[2]}, high[3] = {-1, -1, -1};
+    for (int z = 0; z < size[2]; ++z)
+        for (int y = 0; y < size[1]; ++y) {
+            double inRow[4];
+            bool isRowOutside = false;
+            for (int f = 0; f < 4; ++f) {
+                inRow[f] = atCorner[f] + shape.normal[f][1] * y + shape.normal[f][2] * z;
+                isRowOutside |= inRow[f] + rowRise[f] < 0;
+            }
+            if (isRowOutside) continue;
+            for (int x = 0; x < size[0]; ++x) {
+                bool isOutside = false;
+                for (int f = 0; f < 4; ++f) isOutside |= inRow[f] + shape.normal[f][0] * x < 0;
+                if (isOutside) continue;
+                low[0] = std::min(low[0], x), high[0] = std::max(high[0], x);
+                low[1] = std::min(low[1], y), high[1] = std::max(high[1], y);
+                low[2] = std::min(low[2], z), high[2] = z;
+            }
+        }
+    for (int a = 0; a < 3; ++a) {
+        e.high[a] = std::int16_t(e.low[a] + high[a]);
+        e.low[a] = std::int16_t(e.low[a] + low[a]);
+    }
+    return high[0] >= 0;
 }
 
 void prepareChunk(const SlabInputs& inputs, const IndexBox& points, std::span<const std::int32_t> elements,
@@ -93,6 +135,10 @@ void prepareChunk(const SlabInputs& inputs, const IndexBox& points, std::span<co
         const ElementShape shape = shapeElement(inputs.mesh, inputs.frame, element);
         SliceElement e{};
         if (!placeInRegion(shape, points, e)) continue;
+        const int slices = e.high[inputs.axes.l] - e.low[inputs.axes.l] + 1;
+        const bool mayCover = tighten(shape, points.min, e);
+        chunk.emptyPairs += slices - (mayCover ? e.high[inputs.axes.l] - e.low[inputs.axes.l] + 1 : 0);
+        if (!mayCover) continue;
         const bool isRecorded =
             shape.grade == ShapeGrade::easy   ? recordElement(inputs, element, shape, points, e, chunk.easy)
             : shape.grade == ShapeGrade::thin ? recordElement(inputs, element, shape, points, e, chunk.thin)
@@ -135,6 +181,7 @@ PreparedRegion prepareRegion(const SlabInputs& inputs, const IndexBox& points,
         append(region.thin.geometry, chunk.thin.geometry);
         append(region.thin.channels, chunk.thin.channels);
         append(region.hard, chunk.hard);
+        region.emptyPairs += chunk.emptyPairs;
         chunk = {};
     }
     return region;

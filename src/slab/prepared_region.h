@@ -41,6 +41,8 @@ struct SlabInputs {
     std::span<const ChannelCoding> channels;  ///< 0 to 4
     SampleFormat format = SampleFormat::r32f;
     SliceAxes axes;
+    /// Those of all passes over the region; empty: `channels` are all.
+    std::span<const ChannelCoding> allChannels = {};
 
     /// Channels of a record: one even where nothing but coverage is wanted.
     int recordedChannels() const { return channels.empty() ? 1 : int(channels.size()); }
@@ -53,6 +55,8 @@ struct PreparedRegion {
     RecordList<EasyGeometry> easy;
     RecordList<ThinGeometry> thin;
     std::vector<std::int32_t> hard;  ///< element numbers
+    /// Pairs of element and slice that are left out, because no point of the slice can be in the element.
+    std::int64_t emptyPairs = 0;
     /// In place of the others for the published methods; elements without volume in double are left out.
     std::vector<PublishedGeometry> published;
     std::vector<NodeCodes> nodeCodes;  ///< record by record, channel by channel

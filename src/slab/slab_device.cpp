@@ -39,6 +39,21 @@ GLenum internalFormat(SampleFormat format, int channels) {
     return GL_R32F;
 }
 
+/// Counts while it lives: a query that stays open after a failure would keep all others from beginning.
+class FragmentCount {
+  public:
+    explicit FragmentCount(GlQuery* query) : query_(query) {
+        if (query_) query_->begin();
+    }
+    ~FragmentCount() {
+        if (query_) query_->end();
+    }
+    FragmentCount(const FragmentCount&) = delete;
+
+  private:
+    GlQuery* query_;
+};
+
 }  // namespace
 
 SlabDevice::SlabDevice(GlThread& thread)
@@ -58,8 +73,9 @@ GLuint SlabDevice::upload(GlContext& context, Stream& stream, const void* bytes,
         constexpr GLbitfield kMapping = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
         const std::int64_t size = std::max<std::int64_t>(std::int64_t(count) + std::int64_t(count) / 2, 4096);
         slot.buffer = GlBuffer();
-        slot.buffer = GlBuffer(context, size, kMapping);
-        slot.mapped = slot.buffer.map(0, size, kMapping);
+        GlBuffer made(context, size, kMapping);
+        slot.mapped = made.map(0, size, kMapping);
+        slot.buffer = std::move(made);
     }
     if (count > 0) std::memcpy(slot.mapped, bytes, count);
     counts_.uploadBytes += std::int64_t(count);
@@ -107,22 +123,26 @@ void SlabDevice::prepareTarget(GlContext& context, const Vec3i& size) {
                       target_.size.z >= size.z;
     if (fits) return;
     const Vec3i room = target_.format == format ? glm::max(size, target_.size) : size;
+    // The old one goes first, for its memory; the new one counts once it is whole.
     target_ = Target();
-    target_.size = room;
-    target_.format = format;
-    target_.framebuffer = GlFramebuffer(context);
-    target_.codes = GlTexture(context, GL_TEXTURE_3D, format, room.x, room.y, room.z);
-    target_.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
+    Target made;
+    made.size = room;
+    made.format = format;
+    made.framebuffer = GlFramebuffer(context);
+    made.codes = GlTexture(context, GL_TEXTURE_3D, format, room.x, room.y, room.z);
+    made.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
     if (needsCoverageTarget(format_))
-        target_.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, room.x, room.y, room.z);
-    if (!isLayered_) return;
-    target_.framebuffer.attach(GL_COLOR_ATTACHMENT0, target_.codes);
-    target_.framebuffer.attach(GL_DEPTH_ATTACHMENT, target_.depth);
-    if (target_.coverage) target_.framebuffer.attach(GL_COLOR_ATTACHMENT1, target_.coverage);
-    const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-    context.functions().NamedFramebufferDrawBuffers(target_.framebuffer.id(), target_.coverage ? 2 : 1,
-                                                    buffers);
-    target_.framebuffer.throwIfIncomplete();
+        made.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, room.x, room.y, room.z);
+    if (isLayered_) {
+        made.framebuffer.attach(GL_COLOR_ATTACHMENT0, made.codes);
+        made.framebuffer.attach(GL_DEPTH_ATTACHMENT, made.depth);
+        if (made.coverage) made.framebuffer.attach(GL_COLOR_ATTACHMENT1, made.coverage);
+        const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+        context.functions().NamedFramebufferDrawBuffers(made.framebuffer.id(), made.coverage ? 2 : 1,
+                                                        buffers);
+        made.framebuffer.throwIfIncomplete();
+    }
+    target_ = std::move(made);
 }
 
 void SlabDevice::clear(GlContext& context) {
@@ -142,6 +162,7 @@ void SlabDevice::begin(GlContext& context, const PreparedRegion& region, const S
     axes_ = inputs.axes;
     format_ = inputs.format;
     channels_ = inputs.recordedChannels();
+    usedQueries_ = 0;  // of a region that was broken off
     const Vec3i size = region.points.size();
     size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
     prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0));
@@ -293,16 +314,17 @@ void SlabDevice::drawPublished(GlContext& context, const PublishedList& list) {
 void SlabDevice::draw(GlContext& context, const SliceBatch& batch) {
     // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
     const GlFunctions& gl = context.functions();
-    if (usedQueries_ == timers_.size()) {
+    if (usedQueries_ == timers_.size())
         timers_.push_back({GlQuery(context, GL_TIMESTAMP), GlQuery(context, GL_TIMESTAMP)});
-        if (countsFragments_) fragmentCounters_.emplace_back(context, kFragmentInvocations);
-    }
+    if (countsFragments_ && usedQueries_ == fragmentCounters_.size())
+        fragmentCounters_.emplace_back(context, kFragmentInvocations);
     gl.QueryCounter(timers_[usedQueries_][0].id(), GL_TIMESTAMP);
-    if (countsFragments_) fragmentCounters_[usedQueries_].begin();
-    drawList(context, batch.easy, false);
-    drawList(context, batch.thin, true);
-    drawPublished(context, batch.published);
-    if (countsFragments_) fragmentCounters_[usedQueries_].end();
+    {
+        const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
+        drawList(context, batch.easy, false);
+        drawList(context, batch.thin, true);
+        drawPublished(context, batch.published);
+    }
     gl.QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
     ++usedQueries_;
 }

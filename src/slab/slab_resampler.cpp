@@ -169,16 +169,19 @@ ResampleStatistics BoundSlab::Run::all() {
         }
         while (!jobs_.empty()) finishOldest();
     } catch (...) {
-        // What is queued refers to this call's data: let it pass.
-        device_.thread().run([](GlContext& context) { context.discardFailures(); });
+        // What is queued refers to this call's data: let it pass. Its counts are nobody's.
+        device_.thread().run([&](GlContext& context) {
+            context.discardFailures();
+            device_.takeCounts();
+        });
         throw;
     }
+    const SlabCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
     for (std::size_t b = 0; b < boxes_.size() && !kept_; ++b)
         if (partCounts_[b] == 0) {
             open(b);
             deliver(b);
         }
-    const SlabCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
     statistics_.uploadMs = counts.uploadMs;
     statistics_.renderMs = counts.renderMs;
     statistics_.readBackMs = counts.readBackMs;
@@ -203,7 +206,7 @@ void BoundSlab::Run::plan() {
     }
     frame_ = frameNodes(bound_.mesh_, lattice_, execution_);
     axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(bound_.mesh_, frame_, execution_));
-    bins_ = binElements(bound_.mesh_, frame_, regionBoxes, execution_);
+    bins_ = binElements(bound_.mesh_, frame_, regionBoxes, execution_, float(kLargestMargin));
     statistics_.elementBlockPairs = std::int64_t(bins_.elements.size());
 }
 
@@ -212,13 +215,15 @@ void BoundSlab::Run::start(std::size_t region) {
     job.region = &regions_[region];
     job.passes.resize(passCount());
     for (std::size_t pass = 0; pass < passCount(); ++pass) {
-        const SlabInputs inputs{bound_.mesh_, frame_, channelsOf(pass), bound_.format_, axes_};
+        const SlabInputs inputs{bound_.mesh_,   frame_, channelsOf(pass),
+                                bound_.format_, axes_,  bound_.channels_};
         Timer timer;
         const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
         job.passes[pass] = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
         statistics_.binMs += timer.elapsedMs();
         const PreparedRegion& prepared = job.passes[pass];
         statistics_.exactElements += std::int64_t(prepared.hard.size());
+        statistics_.elementSlicePairs += prepared.emptyPairs;
         job.draws.push_back(device_.thread().post(
             [this, &prepared, inputs](GlContext& context) { device_.begin(context, prepared, inputs); }));
         generate(job, prepared, inputs);
@@ -323,6 +328,22 @@ void BoundSlab::Run::copyPart(const SlabRegion& region, const SlabRegion::Part& 
     if (isWhole) deliver(part.box);
 }
 
+/// The usual case, without a branch a point: one channel, and coverage that the codes tell.
+std::int64_t copyRow(const float* codes, std::int64_t stride, int count, const ChannelCoding& coding,
+                     const SampleMarks& marks, float* values, std::uint8_t* coverage) {
+    int covered = 0;
+    for (int i = 0; i < count; ++i) {
+        const float code = codes[i * stride];
+        const bool isCovered = code != marks.uncovered;
+        const float value =
+            code >= marks.invalidFrom ? std::numeric_limits<float>::quiet_NaN() : coding.decode(code);
+        values[i] = isCovered ? value : 0.0f;
+        coverage[i] = isCovered;
+        covered += isCovered;
+    }
+    return covered;
+}
+
 void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Part& part,
                                   const SlabImage& image, std::size_t pass, Block& block,
                                   std::int64_t& covered) const {
@@ -341,6 +362,12 @@ void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Pa
             const std::int64_t from = at.x * stride[0] + at.y * stride[1] + at.z * stride[2];
             const std::size_t to = block.offset(p);
             const int count = part.points.max.x - part.points.min.x;
+            if (codings.size() == 1 && pass == 0 && !hasCoverage) {
+                covered +=
+                    copyRow(image.codes.data() + from * image.components, stride[0] * image.components, count,
+                            codings[0], marks, block.values.data() + to, block.coverage.data() + to);
+                continue;
+            }
             for (int i = 0; i < count; ++i) {
                 const auto pixel = std::size_t(from + i * stride[0]);
                 const float* codes = image.codes.data() + pixel * std::size_t(image.components);

@@ -11,10 +11,11 @@ namespace {
 /// Corners that move further than this make way for a rectangle.
 constexpr double kLongestMiter = 0x1p-3;
 
+/// A fan of 3 or 4 corners.
 void addTriangles(std::size_t first, std::size_t corners, PrimitiveList& list) {
-    for (std::size_t k = 2; k < corners; ++k)
-        for (const std::size_t at : {first, first + k - 1, first + k})
-            list.indices.push_back(std::uint32_t(at));
+    const auto a = std::uint32_t(first);
+    const std::uint32_t fan[6] = {a, a + 1, a + 2, a, a + 2, a + 3};
+    list.indices.insert(list.indices.end(), fan, fan + (corners - 2) * 3);
 }
 
 }  // namespace
@@ -34,7 +35,7 @@ void emitRect(const PixelRect& rect, int layer, const SliceElement& element, Pri
     addTriangles(first, 4, list);
 }
 
-bool emitGrown(std::span<const std::array<double, 2>> corners, int layer, std::uint32_t record,
+bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, int layer, std::uint32_t record,
                PrimitiveList& list) {
     const std::size_t n = corners.size();
     double directions[4][2];
@@ -44,10 +45,11 @@ bool emitGrown(std::span<const std::array<double, 2>> corners, int layer, std::u
         const double ds = b[0] - a[0], dt = b[1] - a[1];
         const double length = std::sqrt(ds * ds + dt * dt);
         if (!(length > 0x1p-10)) return false;
-        directions[k][0] = ds / length;
-        directions[k][1] = dt / length;
+        const double inverse = 1 / length;
+        directions[k][0] = ds * inverse;
+        directions[k][1] = dt * inverse;
     }
-    // Corner k between the edges that end and begin there moves by g (d_in - d_out) / sin(turn).
+    // Corner k between the edges that end and begin there moves by growth (d_in - d_out) / sin(turn).
     double turnSign = 0, grown[4][2];
     for (std::size_t k = 0; k < n; ++k) {
         const double* in = directions[(k + n - 1) % n];
@@ -57,13 +59,15 @@ bool emitGrown(std::span<const std::array<double, 2>> corners, int layer, std::u
         const double sine = turn * turnSign;
         const double cosine = in[0] * out[0] + in[1] * out[1];
         if (!(sine > 0x1p-16)) return false;
-        const double along = kGrowth / sine;
-        if (along * std::sqrt(std::max(0.0, 2 - 2 * cosine)) > kLongestMiter) return false;
+        const double along = growth / sine;
+        if (along * along * (2 - 2 * cosine) > kLongestMiter * kLongestMiter) return false;
         for (int a = 0; a < 2; ++a) grown[k][a] = corners[k][std::size_t(a)] + along * (in[a] - out[a]);
     }
     const std::size_t first = list.vertices.size();
+    PolygonVertex vertices[4];
     for (std::size_t k = 0; k < n; ++k)
-        list.vertices.push_back({float(grown[k][0]), float(grown[k][1]), record, std::uint32_t(layer)});
+        vertices[k] = {float(grown[k][0]), float(grown[k][1]), record, std::uint32_t(layer)};
+    list.vertices.insert(list.vertices.end(), vertices, vertices + n);
     addTriangles(first, n, list);
     return true;
 }

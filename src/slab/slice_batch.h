@@ -65,6 +65,7 @@ struct SliceElement {
     ShapeGrade grade;
     bool isSmall;  ///< at most kSmallExtent long on every axis: drawn as sprites, the others as polygons
     std::uint32_t record;  ///< of the grade's records
+    float margin;          ///< ElementShape::margin
 };
 
 /// In voxels. Where elements are equally deep the first one drawn owns a point; that small ones come first,
@@ -84,8 +85,8 @@ struct SlabInput {
     int channels = 1;
 };
 
-/// Turns elements into primitives that hold, at least, every pixel centre the element covers in a slice: the
-/// fragment decides. One implementation an algorithm.
+/// Turns elements into primitives that hold, at least, every pixel centre in a slice within the element's
+/// margin: the fragment decides. One implementation an algorithm.
 class SliceGenerator {
   public:
     virtual ~SliceGenerator() = default;
@@ -102,12 +103,12 @@ struct PixelRect {
 /// One sprite, which may hang over the rectangle, for a small element, else two triangles.
 void emitRect(const PixelRect& rect, int layer, const SliceElement& element, PrimitiveList& list);
 
-/// A convex polygon of 3 or 4 corners, grown by kGrowth on all sides. False, and nothing emitted, when a
-/// corner is too sharp or the polygon too thin for that.
-bool emitGrown(std::span<const std::array<double, 2>> corners, int layer, std::uint32_t record,
+/// A convex polygon of 3 or 4 corners, grown by `growth` pixels on all sides. False, and nothing emitted,
+/// when a corner is too sharp or the polygon too thin for that.
+bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, int layer, std::uint32_t record,
                PrimitiveList& list);
 
-/// In pixels: more than what the rasteriser's snapping of corners can take away.
+/// In pixels: more than what the rasteriser's snapping of corners can take away and an element's margin.
 inline constexpr double kGrowth = 0x1p-7;
 
 }  // namespace tessera

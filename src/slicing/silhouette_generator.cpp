@@ -87,8 +87,8 @@ void SilhouetteGenerator::emit(const SlabInput& input, SliceBatch& batch) const 
             PrimitiveList& list = e.grade == ShapeGrade::easy ? batch.easy : batch.thin;
             ++batch.pairs;
             batch.polygons += e.isSmall ? 1 : ready.triangles;
-            if (ready.corners > 0 &&
-                emitGrown(std::span(ready.corner, std::size_t(ready.corners)), layer, e.record, list))
+            if (ready.corners > 0 && emitGrown(std::span(ready.corner, std::size_t(ready.corners)), kGrowth,
+                                               layer, e.record, list))
                 continue;
             emitRect(ready.rect, layer, e, list);
         }

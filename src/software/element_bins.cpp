@@ -110,13 +110,14 @@ constexpr float kFarthest = 0x1p30f + 2048.0f;
 // Bounds of an element in lattice points from the rounded node places, widened by their rounding. False when
 // they hold none.
 #if defined(__SSE2__)
-bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, LatticeBounds& bounds) {
+bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, float margin,
+                   LatticeBounds& bounds) {
     const auto place = [&](std::size_t k) { return _mm_load_ps(frame.rough[std::size_t(tet[k])].index); };
     const __m128 n0 = place(0), n1 = place(1), n2 = place(2), n3 = place(3);
     const __m128 least = _mm_min_ps(_mm_min_ps(n0, n1), _mm_min_ps(n2, n3));
     const __m128 most = _mm_max_ps(_mm_max_ps(n0, n1), _mm_max_ps(n2, n3));
     const __m128 magnitude = _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)), unit = _mm_set1_ps(0x1p-22f),
-                 tiny = _mm_set1_ps(0x1p-26f);
+                 tiny = _mm_set1_ps(0x1p-26f + margin);
     const auto slack = [&](__m128 x) { return _mm_add_ps(_mm_mul_ps(_mm_and_ps(x, magnitude), unit), tiny); };
     const auto cut = [](__m128 x) {
         return _mm_max_ps(_mm_min_ps(x, _mm_set1_ps(kFarthest)), _mm_set1_ps(-kFarthest));
@@ -133,7 +134,8 @@ bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& te
     return _mm_movemask_epi8(_mm_cmpgt_epi32(low, high)) == 0;
 }
 #else
-bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, LatticeBounds& bounds) {
+bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& tet, float margin,
+                   LatticeBounds& bounds) {
     bool some = true;
     for (int a = 0; a < 3; ++a) {
         float least = frame.rough[std::size_t(tet[0])].index[a], most = least;
@@ -141,8 +143,8 @@ bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& te
             least = std::min(least, frame.rough[std::size_t(tet[k])].index[a]);
             most = std::max(most, frame.rough[std::size_t(tet[k])].index[a]);
         }
-        least -= std::fabs(least) * 0x1p-22f + 0x1p-26f;
-        most += std::fabs(most) * 0x1p-22f + 0x1p-26f;
+        least -= std::fabs(least) * 0x1p-22f + 0x1p-26f + margin;
+        most += std::fabs(most) * 0x1p-22f + 0x1p-26f + margin;
         bounds.low[a] = std::int32_t(std::ceil(std::clamp(least, -kFarthest, kFarthest)));
         bounds.high[a] = std::int32_t(std::floor(std::clamp(most, -kFarthest, kFarthest)));
         some = some && bounds.low[a] <= bounds.high[a];
@@ -154,7 +156,7 @@ bool latticeBounds(const NodeFrame& frame, const std::array<std::int32_t, 4>& te
 }  // namespace
 
 ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
-                        const Execution& execution) {
+                        const Execution& execution, float marginVoxels) {
     ElementBins bins;
     bins.first.assign(regions.size() + 1, 0);
     if (regions.empty()) return bins;
@@ -175,7 +177,7 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
                 for (const std::int32_t node : mesh.tets[std::size_t(e + kAhead)])
                     __builtin_prefetch(&frame.rough[std::size_t(node)]);
             LatticeBounds bounds;
-            if (!latticeBounds(frame, mesh.tets[std::size_t(e)], bounds)) continue;
+            if (!latticeBounds(frame, mesh.tets[std::size_t(e)], marginVoxels, bounds)) continue;
             const Vec3i low = glm::max(Vec3i{bounds.low[0], bounds.low[1], bounds.low[2]}, all.min);
             const Vec3i high = glm::min(Vec3i{bounds.high[0], bounds.high[1], bounds.high[2]}, all.max - 1);
             if (low.x > high.x || low.y > high.y || low.z > high.z) continue;

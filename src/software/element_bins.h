@@ -22,7 +22,8 @@ struct ElementBins {
 
 /// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice
 /// point in their (slightly widened) bounding box appear nowhere.
+/// @param marginVoxels boxes are widened by this, besides.
 ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
-                        const Execution& execution);
+                        const Execution& execution, float marginVoxels = 0);
 
 }  // namespace tessera

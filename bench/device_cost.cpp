@@ -1,0 +1,156 @@
+// Counts what a resample asks of an OpenGL device, from the primitives themselves and without a device:
+// device_cost mesh.vtu [--points 256]; and times the processor's part on one thread. Pixels are those of the
+// sprites and the areas of the triangles; a device shades whole quads of 2 x 2 pixels, llvmpipe blocks of 4
+// x 4.
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "bench_statistics.h"
+#include "hybrid/slice_polygon_generator.h"
+#include "io/read_mesh.h"
+#include "slab/prepared_region.h"
+#include "slicing/silhouette_generator.h"
+#include "software/node_frame.h"
+
+namespace {
+
+using namespace tessera;
+
+struct Counts {
+    std::int64_t records = 0, recordBytes = 0;
+    std::int64_t sprites = 0, triangles = 0, vertices = 0, primitiveBytes = 0;
+    double pixels = 0, quadPixels = 0;
+    double generateMs = 0;
+
+    Counts& operator+=(const Counts& other) {
+        records += other.records;
+        recordBytes += other.recordBytes;
+        sprites += other.sprites;
+        triangles += other.triangles;
+        vertices += other.vertices;
+        primitiveBytes += other.primitiveBytes;
+        pixels += other.pixels;
+        quadPixels += other.quadPixels;
+        return *this;
+    }
+};
+
+Counts countList(const PrimitiveList& list) {
+    Counts counts;
+    counts.sprites = std::int64_t(list.sprites.size());
+    counts.triangles = std::int64_t(list.indices.size()) / 3;
+    counts.vertices = counts.sprites + std::int64_t(list.vertices.size());
+    counts.primitiveBytes =
+        std::int64_t(list.sprites.size() * sizeof(Sprite) + list.vertices.size() * sizeof(PolygonVertex) +
+                     list.indices.size() * sizeof(std::uint32_t));
+    for (const Sprite& sprite : list.sprites) {
+        counts.pixels += double(sprite.edge) * sprite.edge;
+        const auto quads = [&](int low) { return (low + sprite.edge - 1) / 2 - low / 2 + 1; };
+        counts.quadPixels += 4.0 * quads(sprite.s) * quads(sprite.t);
+    }
+    for (std::size_t i = 0; i + 2 < list.indices.size(); i += 3) {
+        const PolygonVertex& a = list.vertices[list.indices[i]];
+        const PolygonVertex& b = list.vertices[list.indices[i + 1]];
+        const PolygonVertex& c = list.vertices[list.indices[i + 2]];
+        const double area =
+            std::fabs(double(b.s - a.s) * double(c.t - a.t) - double(b.t - a.t) * double(c.s - a.s)) / 2;
+        counts.pixels += area;
+        const auto [lowS, highS] = std::minmax({a.s, b.s, c.s});
+        const auto [lowT, highT] = std::minmax({a.t, b.t, c.t});
+        // A quad is shaded when one of its centres is inside. Quads of whose centres the square is met, on
+        // average over the triangle's places: no fewer.
+        counts.quadPixels += area + double(highS - lowS) + double(highT - lowT) + 1;
+    }
+    return counts;
+}
+
+/// All slabs of a region of points^3 that spans the mesh.
+Counts countGenerator(const SliceGenerator& generator, const SlabInputs& inputs,
+                      const PreparedRegion& region) {
+    constexpr int kLayersASlab = 8;
+    const ActiveElements active = listActiveElements(region, inputs.axes, kLayersASlab);
+    const int layers = region.points.size()[inputs.axes.l];
+    Counts counts;
+    counts.records = std::int64_t(region.elements.size());
+    counts.recordBytes =
+        std::int64_t(region.easy.geometry.size() * sizeof(EasyGeometry) +
+                     region.thin.geometry.size() * sizeof(ThinGeometry) +
+                     (region.easy.channels.size() + region.thin.channels.size()) * sizeof(ChannelRecord));
+    for (std::size_t slab = 0; slab < active.slabCount(); ++slab) {
+        SlabInput input;
+        input.axes = inputs.axes;
+        input.size = region.points.size();
+        input.layerBegin = int(slab) * kLayersASlab;
+        input.layerEnd = std::min(input.layerBegin + kLayersASlab, layers);
+        input.elements = region.elements;
+        input.active = active.of(slab);
+        SliceBatch batch;
+        const double before = tessera::bench::processorMs();
+        generator.emit(input, batch);
+        counts.generateMs += tessera::bench::processorMs() - before;
+        counts += countList(batch.easy);
+        counts += countList(batch.thin);
+    }
+    return counts;
+}
+
+void count(const std::string& path, int points) {
+    const MeshFile file = readMesh(path, {}, {});
+    const Box3d bounds = file.mesh.boundsWorld();
+    const Vec3d size = bounds.size();
+    const double spacing = std::max({size.x, size.y, size.z}) / (points - 1);
+    const NodeFrame frame = frameNodes(file.mesh, Lattice::axisParallel(bounds.min, spacing), {});
+    std::vector<ChannelCoding> channels;
+    if (!file.mesh.fields.empty()) channels.emplace_back(file.mesh.fields[0], 0, SampleFormat::r32f);
+    const SlabInputs inputs{file.mesh, frame, channels, SampleFormat::r32f,
+                            SliceAxes::along(chooseLayerAxis(file.mesh, frame, {}))};
+    std::vector<std::int32_t> all(std::size_t(file.mesh.elementCount()));
+    std::iota(all.begin(), all.end(), 0);
+    Execution execution;
+    execution.threads = 1;
+    const double before = tessera::bench::processorMs();
+    const PreparedRegion region =
+        prepareRegion(inputs, {{0, 0, 0}, {points, points, points}}, all, execution);
+    const double prepareMs = tessera::bench::processorMs() - before;
+    fmt::print("{} elements, {}^3 points, one field; records take {:.0f} ms of processor time\n",
+               file.mesh.elementCount(), points, prepareMs);
+    fmt::print("{:<8} {:>9} {:>12} {:>9} {:>9} {:>10} {:>15} {:>12} {:>14} {:>12}\n", "", "records",
+               "record bytes", "sprites", "triangles", "vertices", "primitive bytes", "pixels",
+               "quads' pixels", "processor ms");
+    const auto print = [&](const char* name, const SliceGenerator& generator) {
+        const Counts c = countGenerator(generator, inputs, region);
+        fmt::print("{:<8} {:>9} {:>12} {:>9} {:>9} {:>10} {:>15} {:>12.0f} {:>14.0f} {:>12.0f}\n", name,
+                   c.records, c.recordBytes, c.sprites, c.triangles, c.vertices, c.primitiveBytes, c.pixels,
+                   c.quadPixels, c.generateMs);
+    };
+    print("slicing", SilhouetteGenerator());
+    print("hybrid", SlicePolygonGenerator());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Counts what a resample asks of an OpenGL device.");
+    std::string path;
+    int points = 256;
+    app.add_option("mesh", path, "e.g. that of make_graded_mesh.py")->required();
+    // More would be several regions.
+    app.add_option("--points", points, "lattice points along an axis")->check(CLI::Range(2, 256));
+    CLI11_PARSE(app, argc, argv);
+    try {
+        count(path, points);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "device_cost: {}\n", error.what());
+        return 1;
+    }
+    return 0;
+}
