@@ -156,6 +156,18 @@ TEST(ChannelCoding, r32fGivesFloatsBackBitForBit) {
     }
 }
 
+TEST(ChannelCoding, fieldsFarBelowFloatsHaveFiniteCodes) {
+    for (const double size : {1e-46, 1e-60, 1e-300, 5e-324}) {
+        const Field field = fieldOf({size, -size, 0});
+        const ChannelCoding coding(field, 0, SampleFormat::r32f);
+        for (const double value : field.values) {
+            EXPECT_TRUE(std::isfinite(coding.encode(value))) << size;
+            EXPECT_EQ(coding.decode(float(coding.encode(value))), 0.0f) << size;
+        }
+        EXPECT_TRUE(std::isfinite(coding.scale()) && std::isfinite(coding.offset()));
+    }
+}
+
 TEST(ChannelCoding, r32fGivesRandomFloatsOfSixtyBinadesBackBitForBit) {
     Random random(9);
     std::vector<double> values;

@@ -39,7 +39,8 @@ ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat for
         high = std::max(high, value);
     }
     if (!(low <= high)) return;
-    const double most = std::max(std::fabs(low), std::fabs(high));
+    // Far below any float the power of two itself would be infinite; such values count as zero.
+    const double most = double(std::max(std::fabs(float(low)), std::fabs(float(high))));
     if (most > 0) {
         const int exponent = kLargestExponent - std::ilogb(most);
         scale_ = std::ldexp(1.0, exponent);
