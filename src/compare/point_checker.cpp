@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "base/error.h"
+#include "resample/format_error.h"
 
 namespace tessera {
 
@@ -15,49 +16,6 @@ constexpr int kTileEdge = 16;
 constexpr double kSlackVoxels = 1e-9;  // far above the rounding of distances, far below every bound
 constexpr float kUndecided = 1.0f;     // as a share of what is allowed
 constexpr float kNone = std::numeric_limits<float>::infinity();
-
-/// Distance from |x| to the next float.
-double floatUlp(double x) {
-    const double most = std::abs(x);
-    if (most < double(std::numeric_limits<float>::min()))
-        return double(std::numeric_limits<float>::denorm_min());
-    int exponent = 0;
-    std::frexp(most, &exponent);
-    return std::ldexp(1.0, exponent - 24);
-}
-
-/// What one step of a target format is worth, in field units, for values up to `highest` above the range's
-/// lower end.
-double formatStep(SampleFormat format, const ValueRange& range, double highest) {
-    const double width = range.width();
-    if (!(width > 0)) return 0;
-    switch (format) {
-        case SampleFormat::r32f:
-            return 0;
-        case SampleFormat::r16f: {
-            int exponent = 0;
-            std::frexp(highest / width, &exponent);
-            return width * std::ldexp(1.0, std::max(exponent - 11, -24));
-        }
-        case SampleFormat::r16:
-            return width / 65535;
-        case SampleFormat::r8:
-            return width / 255;
-    }
-    return 0;
-}
-
-/// Of the values that are finite in float.
-ValueRange finiteRange(const Field& field, int component) {
-    ValueRange range;
-    for (std::size_t i = std::size_t(component); i < field.values.size();
-         i += std::size_t(field.components)) {
-        if (!std::isfinite(float(field.values[i]))) continue;
-        range.min = std::min(range.min, field.values[i]);
-        range.max = std::max(range.max, field.values[i]);
-    }
-    return range;
-}
 
 /// One field component over one element: a linear function of the weights.
 struct Line {
@@ -199,20 +157,19 @@ class PointChecker::Tile {
                 continue;
             }
             const double exact = line.at(w);
-            double ulps = 4 * floatUlp(line.largest), step = 0;
-            if (bounds_[a].format != SampleFormat::r32f) {
-                // Both the value and its height above the range's lower end go through float.
-                ulps = 4 * floatUlp(std::max(line.largest, line.highest));
-                step = ulps + formatStep(bounds_[a].format, checker_.channels_[c].range, line.highest);
-            }
+            const double error =
+                formatError(bounds_[a].format, checker_.channels_[c].range, line.largest, line.highest);
+            // A float stays in the range of the element's values; what is kept in steps may leave it by as
+            // much.
+            const double step = bounds_[a].format == SampleFormat::r32f ? 0 : error;
             if (!(value >= line.low - step && value <= line.high + step)) return kNone;
             if (line.low == line.high) continue;
             if (!element.isReliable()) {
                 worst = kUndecided;
                 continue;
             }
-            const double allowed = std::max(ulps, step) + line.rounding +
-                                   line.gradient * (bounds_[a].placeVoxels + kSlackVoxels);
+            const double allowed =
+                error + line.rounding + line.gradient * (bounds_[a].placeVoxels + kSlackVoxels);
             worst = std::max(worst, std::abs(value - exact) / allowed);
             if (worst > 1) return kNone;
         }
@@ -291,7 +248,8 @@ PointChecker::PointChecker(const TetMesh& mesh, const VoxelMesh& voxels, std::sp
     : mesh_(mesh), voxels_(voxels), reachVoxels_(reachVoxels) {
     for (const int f : fields) {
         const Field& field = mesh.fields[std::size_t(f)];
-        for (int c = 0; c < field.components; ++c) channels_.push_back({&field, c, finiteRange(field, c)});
+        for (int c = 0; c < field.components; ++c)
+            channels_.push_back({&field, c, finiteFloatRange(field, c)});
     }
 }
 

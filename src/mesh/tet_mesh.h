@@ -51,5 +51,7 @@ struct ValueRange {
     double width() const { return empty() ? 0.0 : max - min; }
 };
 ValueRange fieldRange(const Field& field, int component);
+/// Of the values that are finite in float, as samples are.
+ValueRange finiteFloatRange(const Field& field, int component);
 
 }  // namespace tessera

@@ -30,26 +30,19 @@ double nodeCode(const ChannelCoding& coding, double value) {
 
 ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat format)
     : field_(&field), component_(component), format_(format) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (std::size_t i = std::size_t(component); i < field.values.size();
-         i += std::size_t(field.components)) {
-        const double value = field.values[i];
-        if (!isFloat(value)) continue;
-        low = std::min(low, value);
-        high = std::max(high, value);
-    }
-    if (!(low <= high)) return;
+    const ValueRange range = finiteFloatRange(field, component);
+    if (range.empty()) return;
     // Far below any float the power of two itself would be infinite; such values count as zero.
-    const double most = double(std::max(std::fabs(float(low)), std::fabs(float(high))));
+    const double most = double(std::max(std::fabs(float(range.min)), std::fabs(float(range.max))));
     if (most > 0) {
         const int exponent = kLargestExponent - std::ilogb(most);
         scale_ = std::ldexp(1.0, exponent);
         inverseScale_ = std::ldexp(1.0, -exponent);
     }
-    min_ = low;
-    width_ = high - low;
-    low_ = float(low);
-    high_ = float(high);
+    min_ = range.min;
+    width_ = range.width();
+    low_ = float(range.min);
+    high_ = float(range.max);
 }
 
 double ChannelCoding::encode(double value) const {

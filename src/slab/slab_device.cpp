@@ -60,6 +60,10 @@ SlabDevice::SlabDevice(GlThread& thread)
     : thread_(thread),
       isLayered_(thread.info().hasVertexShaderLayer),
       countsFragments_(std::ranges::count(thread.info().extensions, "GL_ARB_pipeline_statistics_query") > 0) {
+    const double most = thread.info().limits.maxPointSize;
+    if (most < kSmallExtent + 1)
+        throw GlError("the largest points of this device have " + std::to_string(int(most)) +
+                      " pixels; sampling needs " + std::to_string(kSmallExtent + 1));
 }
 
 GLuint SlabDevice::upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count) {

@@ -70,7 +70,7 @@ struct SliceElement {
 
 /// In voxels. Where elements are equally deep the first one drawn owns a point; that small ones come first,
 /// on every axis and in every algorithm and region, makes the choice always the same.
-inline constexpr int kSmallExtent = 5;
+inline constexpr int kSmallExtent = 12;
 
 /// The part of a region that a generator works at: elements in ascending order that reach these layers.
 struct SlabInput {
