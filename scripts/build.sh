@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Configures and builds one preset: scripts/build.sh [release|debug|asan|tsan] [target...]. Uses ccache when it is there.
+# Configures and builds one preset: scripts/build.sh [release|debug|asan|tsan] [target...]. Uses ccache when it is there,
+# unless TESSERA_CCACHE=0.
 # TESSERA_CMAKE_ARGS adds arguments to the configuration; TESSERA_JOBS sets the number of compilers at once.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -7,7 +8,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 preset=${1:-release}
 shift || true
 arguments=()
-if command -v ccache >/dev/null; then
+if [[ ${TESSERA_CCACHE:-1} != 0 ]] && command -v ccache >/dev/null; then
   arguments+=(-DCMAKE_C_COMPILER_LAUNCHER=ccache -DCMAKE_CXX_COMPILER_LAUNCHER=ccache)
 fi
 read -r -a extra <<<"${TESSERA_CMAKE_ARGS:-}"
