@@ -81,10 +81,10 @@ Counts countGenerator(const SliceGenerator& generator, const SlabInputs& inputs,
     const int layers = region.points.size()[inputs.axes.l];
     Counts counts;
     counts.records = std::int64_t(region.elements.size());
-    counts.recordBytes =
-        std::int64_t(region.easy.geometry.size() * sizeof(EasyGeometry) +
-                     region.thin.geometry.size() * sizeof(ThinGeometry) +
-                     (region.easy.channels.size() + region.thin.channels.size()) * sizeof(ChannelRecord));
+    counts.recordBytes = std::int64_t(region.easy.geometry.size() * sizeof(EasyGeometry) +
+                                      region.thin.geometry.size() * sizeof(ThinGeometry) +
+                                      (region.easy.channels[0].size() + region.thin.channels[0].size()) *
+                                          sizeof(ChannelRecord));
     for (std::size_t slab = 0; slab < active.slabCount(); ++slab) {
         SlabInput input;
         input.axes = inputs.axes;

@@ -1,6 +1,6 @@
 add_library(contract_suite STATIC contract_suite.cpp contract_cases.cpp oracle_resampler.cpp quantised_resampler.cpp)
 target_link_libraries(contract_suite PUBLIC tessera_reference GTest::gtest PRIVATE tessera_flags)
-tessera_precompile(contract_suite tests_precompiled)
+tessera_precompile(contract_suite)
 
 tessera_test(oracle_test LINK reference)
 tessera_test(contract_checker_test LINK reference PRIVATE_LINK contract_suite)

@@ -171,7 +171,7 @@ class NumberedRegion {
         region_ = prepareRegion(inputs, box, elements, {.threads = 1});
         for (const SliceElement& e : region_.elements) {
             const auto& channels =
-                e.grade == ShapeGrade::easy ? region_.easy.channels : region_.thin.channels;
+                e.grade == ShapeGrade::easy ? region_.easy.channels[0] : region_.thin.channels[0];
             slices_.at(std::size_t(coding.decode(channels.at(e.record).value))) = &e;
         }
         for (const std::int32_t element : region_.hard) isHard_[std::size_t(element)] = 1;

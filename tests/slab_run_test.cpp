@@ -134,7 +134,7 @@ SlabImage render(SlabDevice& device, const SlabInputs& inputs, const IndexBox& p
     const PreparedRegion region = prepareRegion(inputs, points, elements, {});
     constexpr int kLayersASlab = 8;
     const ActiveElements active = listActiveElements(region, inputs.axes, kLayersASlab);
-    const auto decided = decideHardElements(inputs, region, {});
+    const auto decided = decideHardElements(inputs, region, 0, {});
     return device.thread().run([&](GlContext& context) {
         device.begin(context, region, inputs);
         if (beforeDraws) beforeDraws(context);

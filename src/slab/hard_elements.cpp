@@ -42,13 +42,14 @@ std::vector<Cell> sortIntoCells(const SlabInputs& inputs, const PreparedRegion& 
     return cells;
 }
 
-std::vector<DecidedPoint> decideCell(const SlabInputs& inputs, const IndexBox& region, const Cell& cell) {
+std::vector<DecidedPoint> decideCell(const SlabInputs& inputs, std::span<const ChannelCoding> codings,
+                                     const IndexBox& region, const Cell& cell) {
     const auto count = std::size_t(cell.points.count());
     std::vector<ScanChannel> channels;
-    std::vector<std::vector<float>> values(inputs.channels.size(), std::vector<float>(count));
+    std::vector<std::vector<float>> values(codings.size(), std::vector<float>(count));
     std::vector<float*> valuePointers;
-    for (std::size_t c = 0; c < inputs.channels.size(); ++c) {
-        const ChannelCoding& coding = inputs.channels[c];
+    for (std::size_t c = 0; c < codings.size(); ++c) {
+        const ChannelCoding& coding = codings[c];
         channels.push_back({coding.field().values.data(), coding.field().components, coding.component(),
                             coding.isOfCells()});
         valuePointers.push_back(values[c].data());
@@ -81,7 +82,7 @@ std::vector<DecidedPoint> decideCell(const SlabInputs& inputs, const IndexBox& r
                            {0, 0, 0, 0}};
         for (std::size_t c = 0; c < channels.size(); ++c) {
             const float value = values[c][i];
-            point.codes[c] = std::isfinite(value) ? float(inputs.channels[c].encode(double(value))) : invalid;
+            point.codes[c] = std::isfinite(value) ? float(codings[c].encode(double(value))) : invalid;
         }
         points.push_back(point);
     }
@@ -91,12 +92,13 @@ std::vector<DecidedPoint> decideCell(const SlabInputs& inputs, const IndexBox& r
 }  // namespace
 
 std::vector<DecidedPoint> decideHardElements(const SlabInputs& inputs, const PreparedRegion& region,
-                                             const Execution& execution) {
+                                             std::size_t pass, const Execution& execution) {
     if (region.hard.empty()) return {};
     const std::vector<Cell> cells = sortIntoCells(inputs, region);
     std::vector<std::vector<DecidedPoint>> ofCells(cells.size());
     parallelFor(execution, std::int64_t(cells.size()), [&](std::int64_t i) {
-        ofCells[std::size_t(i)] = decideCell(inputs, region.points, cells[std::size_t(i)]);
+        ofCells[std::size_t(i)] =
+            decideCell(inputs, inputs.channelsOf(pass), region.points, cells[std::size_t(i)]);
     });
     std::vector<DecidedPoint> points;
     for (const auto& ofCell : ofCells) points.insert(points.end(), ofCell.begin(), ofCell.end());

@@ -72,12 +72,13 @@ bool recordElement(const SlabInputs& inputs, std::int32_t element, const Element
     double base[3];
     for (int a = 0; a < 3; ++a) base[a] = std::max(0.0, double(cell[a]) - double(shape.first[a]));
     // Passes must not disagree about who decides, or the channels of a point could be of different elements.
-    for (const ChannelCoding& coding : inputs.allChannels.empty() ? inputs.channels : inputs.allChannels)
+    for (const ChannelCoding& coding : inputs.channels)
         if (!isSafeOnDevice(coding, inputs.mesh, element)) return false;
     const float invalid = sampleMarks(inputs.format).invalid;
-    for (const ChannelCoding& coding : inputs.channels)
-        recordChannel(coding, inputs.mesh, element, shape, base, invalid, list.channels.emplace_back());
-    if (inputs.channels.empty()) list.channels.push_back({});
+    for (std::size_t c = 0; c < inputs.channels.size(); ++c)
+        recordChannel(inputs.channels[c], inputs.mesh, element, shape, base, invalid,
+                      list.channels[c / kChannelsAPass].emplace_back());
+    if (inputs.channels.empty()) list.channels[0].push_back({});
     e.record = std::uint32_t(list.geometry.size());
     recordGeometry(shape, base, points.min, list.geometry.emplace_back());
     return true;
@@ -122,11 +123,20 @@ bool tighten(const ElementShape& shape, const Vec3i& regionMin, SliceElement& e)
     return high[0] >= 0;
 }
 
+/// Nearly all elements are easy.
+void reserve(const SlabInputs& inputs, std::size_t count, std::vector<SliceElement>& elements,
+             RecordList<EasyGeometry>& easy, RecordList<ThinGeometry>& thin) {
+    elements.reserve(count);
+    easy.geometry.reserve(count);
+    easy.channels.resize(inputs.passCount());
+    thin.channels.resize(inputs.passCount());
+    for (std::size_t pass = 0; pass < inputs.passCount(); ++pass)
+        easy.channels[pass].reserve(count * std::size_t(inputs.recordedChannels(pass)));
+}
+
 void prepareChunk(const SlabInputs& inputs, const IndexBox& points, std::span<const std::int32_t> elements,
                   Chunk& chunk) {
-    chunk.elements.reserve(elements.size());
-    chunk.easy.geometry.reserve(elements.size());
-    chunk.easy.channels.reserve(elements.size() * std::size_t(inputs.recordedChannels()));
+    reserve(inputs, elements.size(), chunk.elements, chunk.easy, chunk.thin);
     for (std::size_t i = 0; i < elements.size(); ++i) {
         if (i + 8 < elements.size())
             for (const std::int32_t node : inputs.mesh.tets[std::size_t(elements[i + 8])])
@@ -155,6 +165,13 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
     to.insert(to.end(), from.begin(), from.end());
 }
 
+template <class Geometry>
+void append(RecordList<Geometry>& to, const RecordList<Geometry>& from) {
+    append(to.geometry, from.geometry);
+    for (std::size_t pass = 0; pass < to.channels.size(); ++pass)
+        append(to.channels[pass], from.channels[pass]);
+}
+
 }  // namespace
 
 PreparedRegion prepareRegion(const SlabInputs& inputs, const IndexBox& points,
@@ -167,19 +184,15 @@ PreparedRegion prepareRegion(const SlabInputs& inputs, const IndexBox& points,
     });
     PreparedRegion region;
     region.points = points;
-    region.elements.reserve(elements.size());
-    region.easy.geometry.reserve(elements.size());
-    region.easy.channels.reserve(elements.size() * std::size_t(inputs.recordedChannels()));
+    reserve(inputs, elements.size(), region.elements, region.easy, region.thin);
     for (Chunk& chunk : chunks) {
         for (SliceElement e : chunk.elements) {
             e.record += std::uint32_t(e.grade == ShapeGrade::easy ? region.easy.geometry.size()
                                                                   : region.thin.geometry.size());
             region.elements.push_back(e);
         }
-        append(region.easy.geometry, chunk.easy.geometry);
-        append(region.easy.channels, chunk.easy.channels);
-        append(region.thin.geometry, chunk.thin.geometry);
-        append(region.thin.channels, chunk.thin.channels);
+        append(region.easy, chunk.easy);
+        append(region.thin, chunk.thin);
         append(region.hard, chunk.hard);
         region.emptyPairs += chunk.emptyPairs;
         chunk = {};

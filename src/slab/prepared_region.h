@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,25 +28,36 @@ struct alignas(32) ThinGeometry {
 };
 static_assert(sizeof(EasyGeometry) == 80 && sizeof(ThinGeometry) == 160 && sizeof(ChannelRecord) == 32);
 
-/// Records of one grade, in no order; element i's channels are channels[i * channelCount ...].
+/// Channels that one pass over a region samples: those of a target's pixel.
+inline constexpr std::size_t kChannelsAPass = 4;
+
+/// Records of one grade, in no order; element i's channels of a pass are channels[pass][i * channelCount
+/// ...].
 template <class Geometry>
 struct RecordList {
     std::vector<Geometry> geometry;
-    std::vector<ChannelRecord> channels;
+    std::vector<std::vector<ChannelRecord>> channels;
 };
 
 /// What is sampled, and how.
 struct SlabInputs {
     const TetMesh& mesh;
     const NodeFrame& frame;
-    std::span<const ChannelCoding> channels;  ///< 0 to 4
+    std::span<const ChannelCoding> channels;
     SampleFormat format = SampleFormat::r32f;
     SliceAxes axes;
-    /// Those of all passes over the region; empty: `channels` are all.
-    std::span<const ChannelCoding> allChannels = {};
 
+    std::size_t passCount() const {
+        return std::max<std::size_t>(1, (channels.size() + kChannelsAPass - 1) / kChannelsAPass);
+    }
+    std::span<const ChannelCoding> channelsOf(std::size_t pass) const {
+        const std::size_t from = pass * kChannelsAPass;
+        return channels.subspan(from, std::min(kChannelsAPass, channels.size() - from));
+    }
     /// Channels of a record: one even where nothing but coverage is wanted.
-    int recordedChannels() const { return channels.empty() ? 1 : int(channels.size()); }
+    int recordedChannels(std::size_t pass) const {
+        return int(std::max<std::size_t>(1, channelsOf(pass).size()));
+    }
 };
 
 /// The elements of a region, ready for generators and shaders.
@@ -59,7 +71,8 @@ struct PreparedRegion {
     std::int64_t emptyPairs = 0;
     /// In place of the others for the published methods; elements without volume in double are left out.
     std::vector<PublishedGeometry> published;
-    std::vector<NodeCodes> nodeCodes;  ///< record by record, channel by channel
+    /// A list a pass: record by record, channel by channel.
+    std::vector<std::vector<NodeCodes>> nodeCodes;
 };
 
 /// Sets all of an element but its record. False when it holds no lattice point of the region.
@@ -95,9 +108,9 @@ struct DecidedPoint {
     float codes[4];
 };
 
-/// Samples elements that no shader can decide, by the software resampler's scan.
+/// Samples elements that no shader can decide, by the software resampler's scan: the channels of one pass.
 std::vector<DecidedPoint> decideHardElements(const SlabInputs& inputs, const PreparedRegion& region,
-                                             const Execution& execution);
+                                             std::size_t pass, const Execution& execution);
 
 /// The slice axis with the fewest pairs of element and slice, over the whole mesh: z unless another is better
 /// by an eighth, since memory runs along x.

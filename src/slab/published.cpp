@@ -13,7 +13,7 @@ constexpr std::int64_t kChunk = 4096;
 struct PublishedChunk {
     std::vector<SliceElement> elements;
     std::vector<PublishedGeometry> geometry;
-    std::vector<NodeCodes> codes;
+    std::vector<std::vector<NodeCodes>> codes;  ///< a list a pass
 };
 
 PublishedGeometry geometryOf(const ElementShape& shape, const Vec3i& regionMin, const SliceAxes& axes) {
@@ -33,6 +33,7 @@ PublishedGeometry geometryOf(const ElementShape& shape, const Vec3i& regionMin, 
 void prepareChunk(const SlabInputs& inputs, const IndexBox& points, std::span<const std::int32_t> elements,
                   PublishedChunk& chunk) {
     const float invalid = sampleMarks(inputs.format).invalid;
+    chunk.codes.resize(inputs.passCount());
     for (const std::int32_t element : elements) {
         const ElementShape shape = shapeElement(inputs.mesh, inputs.frame, element);
         SliceElement e{};
@@ -40,9 +41,10 @@ void prepareChunk(const SlabInputs& inputs, const IndexBox& points, std::span<co
         e.record = std::uint32_t(chunk.geometry.size());
         chunk.elements.push_back(e);
         chunk.geometry.push_back(geometryOf(shape, points.min, inputs.axes));
-        for (const ChannelCoding& coding : inputs.channels)
-            chunk.codes.push_back(codesAtNodes(coding, inputs.mesh, element, invalid));
-        if (inputs.channels.empty()) chunk.codes.push_back({});
+        for (std::size_t c = 0; c < inputs.channels.size(); ++c)
+            chunk.codes[c / kChannelsAPass].push_back(
+                codesAtNodes(inputs.channels[c], inputs.mesh, element, invalid));
+        if (inputs.channels.empty()) chunk.codes[0].push_back({});
     }
 }
 
@@ -72,6 +74,7 @@ PreparedRegion preparePublishedRegion(const SlabInputs& inputs, const IndexBox& 
     });
     PreparedRegion region;
     region.points = points;
+    region.nodeCodes.resize(inputs.passCount());
     for (const PublishedChunk& chunk : chunks) {
         const auto before = std::uint32_t(region.published.size());
         for (SliceElement e : chunk.elements) {
@@ -79,7 +82,9 @@ PreparedRegion preparePublishedRegion(const SlabInputs& inputs, const IndexBox& 
             region.elements.push_back(e);
         }
         region.published.insert(region.published.end(), chunk.geometry.begin(), chunk.geometry.end());
-        region.nodeCodes.insert(region.nodeCodes.end(), chunk.codes.begin(), chunk.codes.end());
+        for (std::size_t pass = 0; pass < chunk.codes.size(); ++pass)
+            region.nodeCodes[pass].insert(region.nodeCodes[pass].end(), chunk.codes[pass].begin(),
+                                          chunk.codes[pass].end());
     }
     return region;
 }

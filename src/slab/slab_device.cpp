@@ -162,26 +162,28 @@ void SlabDevice::clear(GlContext& context) {
                             zero);
 }
 
-void SlabDevice::begin(GlContext& context, const PreparedRegion& region, const SlabInputs& inputs) {
+void SlabDevice::begin(GlContext& context, const PreparedRegion& region, const SlabInputs& inputs,
+                       std::size_t pass) {
     axes_ = inputs.axes;
     format_ = inputs.format;
-    channels_ = inputs.recordedChannels();
+    channels_ = inputs.recordedChannels(pass);
     usedQueries_ = 0;  // of a region that was broken off
     const Vec3i size = region.points.size();
     size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
     prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0));
     clear(context);
+    // Geometry stays where the first pass put it.
     if (!region.easy.geometry.empty()) {
-        upload(context, easyGeometry_, region.easy.geometry);
-        upload(context, easyChannels_, region.easy.channels);
-    }
-    if (!region.published.empty()) {
-        upload(context, published_, region.published);
-        upload(context, nodeCodes_, region.nodeCodes);
+        if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
+        upload(context, easyChannels_, region.easy.channels[pass]);
     }
     if (!region.thin.geometry.empty()) {
-        upload(context, thinGeometry_, region.thin.geometry);
-        upload(context, thinChannels_, region.thin.channels);
+        if (pass == 0) upload(context, thinGeometry_, region.thin.geometry);
+        upload(context, thinChannels_, region.thin.channels[pass]);
+    }
+    if (!region.published.empty()) {
+        if (pass == 0) upload(context, published_, region.published);
+        upload(context, nodeCodes_, region.nodeCodes[pass]);
     }
 }
 

@@ -40,8 +40,9 @@ class SlabDevice {
     GlThread& thread() { return thread_; }
     std::mutex exclusive;
 
-    /// Clears the target for a region and takes its records. @param axes of the target.
-    void begin(GlContext& context, const PreparedRegion& region, const SlabInputs& inputs);
+    /// Clears the target for a region and takes its records. The passes over a region follow one another.
+    void begin(GlContext& context, const PreparedRegion& region, const SlabInputs& inputs,
+               std::size_t pass = 0);
     /// Draws what a generator made. Each slice may be drawn by one call only.
     void draw(GlContext& context, const SliceBatch& batch);
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);

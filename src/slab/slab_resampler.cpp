@@ -23,7 +23,6 @@ namespace {
 
 /// What a region may take on the device.
 constexpr std::int64_t kTargetBytes = std::int64_t(160) << 20;
-constexpr int kChannelsAPass = 4;
 /// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
 constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
 
@@ -36,7 +35,9 @@ struct OpenBlock {
 /// A region on its way through the device.
 struct RegionJob {
     const SlabRegion* region = nullptr;
-    std::vector<PreparedRegion> passes;  ///< one for every group of channels; kept until the device is done
+    PreparedRegion prepared;  ///< kept until the device is done
+    /// Kept for the passes after the first, when there are any.
+    std::vector<std::shared_ptr<const SliceBatch>> batches;
     std::vector<std::future<void>> draws;
     std::vector<std::future<SlabImage>> images;
 };
@@ -105,7 +106,8 @@ class BoundSlab : public BoundSlabResampler {
       private:
         void plan();
         void start(std::size_t region);
-        void generate(RegionJob& job, const PreparedRegion& prepared, const SlabInputs& inputs);
+        void generate(RegionJob& job, std::size_t pass);
+        void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch);
         void finishOldest();
         void copyPart(const SlabRegion& region, const SlabRegion::Part& part,
                       const std::vector<SlabImage>& images);
@@ -113,14 +115,8 @@ class BoundSlab : public BoundSlabResampler {
                           std::size_t pass, Block& block, std::int64_t& covered) const;
         Block& open(std::size_t box);
         void deliver(std::size_t box);
-        std::span<const ChannelCoding> channelsOf(std::size_t pass) const {
-            const std::size_t from = pass * kChannelsAPass;
-            const std::span all(bound_.channels_);
-            return all.subspan(from, std::min<std::size_t>(kChannelsAPass, all.size() - from));
-        }
-        std::size_t passCount() const {
-            return std::max<std::size_t>(1, (bound_.channels_.size() + kChannelsAPass - 1) / kChannelsAPass);
-        }
+        /// Once planned.
+        SlabInputs inputs() const { return {bound_.mesh_, frame_, bound_.channels_, bound_.format_, axes_}; }
 
         const BoundSlab& bound_;
         SlabDevice& device_;
@@ -154,8 +150,9 @@ ResampleStatistics BoundSlab::Run::all() {
     Timer timer;
     if (kept_)
         device_.thread().run([&](GlContext& context) {
-            for (std::size_t pass = 0; pass < passCount(); ++pass)
-                device_.addGroup(context, *kept_, int(channelsOf(pass).size()), bound_.format_);
+            const SlabInputs all = inputs();
+            for (std::size_t pass = 0; pass < all.passCount(); ++pass)
+                device_.addGroup(context, *kept_, int(all.channelsOf(pass).size()), bound_.format_);
         });
     plan();
     statistics_.binMs = timer.restart();
@@ -213,20 +210,18 @@ void BoundSlab::Run::plan() {
 void BoundSlab::Run::start(std::size_t region) {
     RegionJob& job = jobs_.emplace_back();
     job.region = &regions_[region];
-    job.passes.resize(passCount());
-    for (std::size_t pass = 0; pass < passCount(); ++pass) {
-        const SlabInputs inputs{bound_.mesh_,   frame_, channelsOf(pass),
-                                bound_.format_, axes_,  bound_.channels_};
-        Timer timer;
-        const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
-        job.passes[pass] = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
-        statistics_.binMs += timer.elapsedMs();
-        const PreparedRegion& prepared = job.passes[pass];
-        statistics_.exactElements += std::int64_t(prepared.hard.size());
-        statistics_.elementSlicePairs += prepared.emptyPairs;
-        job.draws.push_back(device_.thread().post(
-            [this, &prepared, inputs](GlContext& context) { device_.begin(context, prepared, inputs); }));
-        generate(job, prepared, inputs);
+    const SlabInputs inputs = this->inputs();
+    const Timer timer;
+    const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
+    job.prepared = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
+    statistics_.binMs += timer.elapsedMs();
+    statistics_.exactElements += std::int64_t(job.prepared.hard.size());
+    statistics_.elementSlicePairs += job.prepared.emptyPairs;
+    for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
+        job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
+            device_.begin(context, job.prepared, inputs, pass);
+        }));
+        generate(job, pass);
         if (kept_)
             job.draws.push_back(device_.thread().post([this, pass, at = region](GlContext& context) {
                 device_.copyTo(context, *kept_, pass, regions_[at].points.min - kept_->box.min);
@@ -235,41 +230,58 @@ void BoundSlab::Run::start(std::size_t region) {
             job.images.push_back(
                 device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
     }
+    job.batches.clear();
 }
 
-void BoundSlab::Run::generate(RegionJob& job, const PreparedRegion& prepared, const SlabInputs& inputs) {
+void BoundSlab::Run::post(RegionJob& job, std::shared_ptr<const SliceBatch> batch) {
+    job.draws.push_back(device_.thread().post(
+        [this, batch = std::move(batch)](GlContext& context) { device_.draw(context, *batch); }));
+}
+
+void BoundSlab::Run::generate(RegionJob& job, std::size_t pass) {
     const Timer timer;
-    const Vec3i size = prepared.points.size();
-    const int layers = size[axes_.l];
-    constexpr int kLayersASlab = 8;
-    const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
-    parallelFor(execution_, std::int64_t(active.slabCount()), [&](std::int64_t i) {
-        const auto slab = std::size_t(i);
-        if (active.of(slab).empty()) return;
-        auto batch = std::make_shared<SliceBatch>();
-        const int first = int(i) * kLayersASlab;
-        const SlabInput input{axes_,
-                              size,
-                              first,
-                              std::min(first + kLayersASlab, layers),
-                              prepared.elements,
-                              active.of(slab),
-                              prepared.published,
-                              prepared.nodeCodes,
-                              inputs.recordedChannels()};
-        if (bound_.isPublished_)
-            bound_.generator_.emitPublished(input, *batch);
-        else
-            bound_.generator_.emit(input, *batch);
-        const std::lock_guard guard(mutex_);
-        statistics_.elementSlicePairs += batch->pairs;
-        statistics_.polygons += batch->polygons;
-        job.draws.push_back(
-            device_.thread().post([this, batch](GlContext& context) { device_.draw(context, *batch); }));
-    });
+    const SlabInputs inputs = this->inputs();
+    const PreparedRegion& prepared = job.prepared;
+    // Primitives know nothing of channels, but those of the published methods hold values.
+    if (pass > 0 && !bound_.isPublished_) {
+        for (const auto& batch : job.batches) post(job, batch);
+    } else {
+        const Vec3i size = prepared.points.size();
+        const int layers = size[axes_.l];
+        constexpr int kLayersASlab = 8;
+        const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
+        parallelFor(execution_, std::int64_t(active.slabCount()), [&](std::int64_t i) {
+            const auto slab = std::size_t(i);
+            if (active.of(slab).empty()) return;
+            auto batch = std::make_shared<SliceBatch>();
+            const int first = int(i) * kLayersASlab;
+            SlabInput input{};
+            input.axes = axes_;
+            input.size = size;
+            input.layerBegin = first;
+            input.layerEnd = std::min(first + kLayersASlab, layers);
+            input.elements = prepared.elements;
+            input.active = active.of(slab);
+            if (bound_.isPublished_) {
+                input.published = prepared.published;
+                input.nodeCodes = prepared.nodeCodes[pass];
+                input.channels = inputs.recordedChannels(pass);
+                bound_.generator_.emitPublished(input, *batch);
+            } else {
+                bound_.generator_.emit(input, *batch);
+            }
+            const std::lock_guard guard(mutex_);
+            if (pass == 0) {
+                statistics_.elementSlicePairs += batch->pairs;
+                statistics_.polygons += batch->polygons;
+            }
+            if (inputs.passCount() > 1) job.batches.push_back(batch);
+            post(job, std::move(batch));
+        });
+    }
     if (!prepared.hard.empty()) {
-        auto points =
-            std::make_shared<std::vector<DecidedPoint>>(decideHardElements(inputs, prepared, execution_));
+        auto points = std::make_shared<std::vector<DecidedPoint>>(
+            decideHardElements(inputs, prepared, pass, execution_));
         job.draws.push_back(
             device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
     }
@@ -281,7 +293,7 @@ void BoundSlab::Run::finishOldest() {
     std::vector<SlabImage> images;
     for (auto& draw : job.draws) draw.get();
     for (auto& image : job.images) images.push_back(image.get());
-    job.passes.clear();
+    job.prepared = {};
     if (kept_) {
         jobs_.pop_front();
         return;
@@ -347,7 +359,8 @@ std::int64_t copyRow(const float* codes, std::int64_t stride, int count, const C
 void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Part& part,
                                   const SlabImage& image, std::size_t pass, Block& block,
                                   std::int64_t& covered) const {
-    const auto codings = channelsOf(pass);
+    const SlabInputs inputs = this->inputs();
+    const std::span<const ChannelCoding> codings = inputs.channelsOf(pass);
     const SampleMarks marks = sampleMarks(bound_.format_);
     const Vec3i size = region.points.size();
     std::int64_t stride[3];
