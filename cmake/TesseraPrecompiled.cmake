@@ -12,18 +12,15 @@ set(TESSERA_COMMON_HEADERS
   <future> <limits> <map> <memory> <mutex> <numeric> <optional> <random> <set> <span> <sstream> <stdexcept> <string>
   <string_view> <thread> <tuple> <unordered_map> <utility> <variant> <vector>)
 
-# tessera_precompiled_headers(<target> [FOR_PROGRAMS] LINK <libraries> HEADERS <headers>): a target that holds a precompiled header of
-# the common headers and these, for tessera_precompile. Its options must be those of its users.
+# tessera_precompiled_headers(<target> LINK <libraries> HEADERS <headers>): a target that holds a precompiled header of
+# the common headers and these, for tessera_precompile.
 function(tessera_precompiled_headers target)
-  cmake_parse_arguments(ARG "FOR_PROGRAMS" "" "LINK;HEADERS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "LINK;HEADERS" ${ARGN})
   if(TESSERA_PRECOMPILE)
     file(WRITE ${PROJECT_BINARY_DIR}/precompiled/${target}.cpp "")
     add_library(${target} OBJECT ${PROJECT_BINARY_DIR}/precompiled/${target}.cpp)
     target_compile_features(${target} PRIVATE cxx_std_20)
     target_link_libraries(${target} PRIVATE ${ARG_LINK} tessera_flags)
-    if(ARG_FOR_PROGRAMS)
-      tessera_program_options(${target})
-    endif()
     target_precompile_headers(${target} PRIVATE ${TESSERA_COMMON_HEADERS} ${ARG_HEADERS})
   endif()
 endfunction()

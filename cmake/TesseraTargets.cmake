@@ -30,17 +30,6 @@ function(tessera_layer name)
   set_property(GLOBAL APPEND PROPERTY TESSERA_LAYERS ${name})
 endfunction()
 
-# Options of a program's own code, and of the precompiled headers that it uses.
-function(tessera_program_options target)
-  # -fPIC like the layers, in place of -fPIE, so that one precompiled header serves both.
-  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-  # The time goes into the layers, not into a program, whose JSON and test macros compile in half the time at -O1.
-  target_compile_options(${target} PRIVATE -fPIC $<$<CONFIG:Release>:-O1>)
-  if(TESSERA_SANITIZE)
-    target_compile_options(${target} PRIVATE -O0)
-  endif()
-endfunction()
-
 function(tessera_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PRIVATE_LINK;PRECOMPILED" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
@@ -49,6 +38,8 @@ function(tessera_program name)
     target_link_libraries(${name} PRIVATE tessera_${layer})
   endforeach()
   target_link_libraries(${name} PRIVATE ${ARG_PRIVATE_LINK} tessera_flags)
-  tessera_program_options(${name})
+  # -fPIC like the layers, in place of -fPIE, so that one precompiled header serves both.
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+  target_compile_options(${name} PRIVATE -fPIC)
   tessera_precompile(${name} ${ARG_PRECOMPILED})
 endfunction()
