@@ -16,8 +16,8 @@ if(TARGET tessera)
   endif()
 endif()
 
-# What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes;
-# for threads the tests of what runs on several.
+# What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
+# nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
 set(sanitized_areas base gl mesh mirror compare plane cut split read software slab device registry brick refine seams measure extend oracle
   contract_checker contract_format contract_test vdb image)
 if(TESSERA_SANITIZE MATCHES thread)
@@ -35,8 +35,6 @@ foreach(test IN LISTS tests_here)
 endforeach()
 add_custom_target(sanitized_tests DEPENDS ${sanitized_programs})
 if(TARGET tessera)
-  add_dependencies(sanitized_tests tessera)
-  set_property(TEST app_test.BadInput APPEND PROPERTY LABELS sanitized)
   # It sends signals in the middle of a run, so nothing else should slow that run down.
   set_tests_properties(app_test.Interruption PROPERTIES RUN_SERIAL ON)
 endif()
