@@ -39,7 +39,10 @@ if(device_filters)
     endif()
   endforeach()
 endif()
-if(TESSERA_SANITIZE MATCHES thread)
+if(TESSERA_SANITIZE MATCHES address)
+  # The same arithmetic over and over for the same bits: left to the thread sanitizer and the release build.
+  set_tests_properties(contract_test PROPERTIES ENVIRONMENT "GTEST_FILTER=-*SameBits*:*Slicing*:*Hybrid*")
+elseif(TESSERA_SANITIZE MATCHES thread)
   # What runs on several threads; the oracle doesn't.
   set_tests_properties(contract_test PROPERTIES
     ENVIRONMENT "GTEST_FILTER=*SameBits*/Software*JitteredBox:*SameBits*/Software*GradedDelaunay:*SameBits*/Software*ThinTets*")
