@@ -12,7 +12,8 @@ namespace tessera {
 
 struct DeviceSamples;
 
-/// A bound OpenGL resampler: besides, it can leave its samples on the device.
+/// A bound OpenGL resampler: besides, it can leave its samples on the device. Runs on one platform take
+/// turns, so a sink must not resample on the platform that feeds it: it would wait for itself.
 class BoundSlabResampler : public BoundResampler {
   public:
     /// Samples one box into 3D textures of sharedGlThread(of its target's platform), without reading back.
