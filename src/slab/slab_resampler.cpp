@@ -115,7 +115,7 @@ class BoundSlab : public BoundSlabResampler {
                           std::size_t pass, Block& block, std::int64_t& covered) const;
         Block& open(std::size_t box);
         void deliver(std::size_t box);
-        /// Once planned.
+        /// Frame and axes are set by plan().
         SlabInputs inputs() const { return {bound_.mesh_, frame_, bound_.channels_, bound_.format_, axes_}; }
 
         const BoundSlab& bound_;
