@@ -30,7 +30,37 @@ struct Channel {
     const Field* field;
     int component;
     FormatAllowance allowance;
+    /// By element, per voxel; negative: not computed yet. Rational arithmetic takes long, and an element may
+    /// own many points.
+    std::vector<double> gradients;
 };
+
+/// Barycentric coordinates of a point in an element, each within 2^-32, when double is enough for that.
+std::optional<std::array<double, 4>> quickBarycentrics(const Oracle& oracle, std::int64_t element,
+                                                       const Vec3i& p) {
+    const auto& tet = oracle.mesh().tets[std::size_t(element)];
+    std::array<Vec3d, 4> at;
+    Box3d box;
+    double farthest = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        const Vec3d& node = oracle.frame().indexNode(tet[i]);
+        for (int a = 0; a < 3; ++a) farthest = std::max(farthest, std::abs(node[a]));
+        at[i] = node - Vec3d(p);
+        box.include(at[i]);
+    }
+    const Vec3d extent = box.size();
+    const double length = std::max({extent.x, extent.y, extent.z});
+    // As for the planes in reference_block.cpp: differences of places err by under `slip`, determinants by
+    // under 64 length^2 slip.
+    const double slip = std::ldexp(farthest, -49) + std::ldexp(length, -52);
+    const double volume = dot(cross(at[1] - at[0], at[2] - at[0]), at[3] - at[0]);
+    if (!(128 * length * length * slip < 0x1p-33 * std::abs(volume))) return std::nullopt;
+    std::array<double, 4> weights{0, dot(cross(at[2], at[0]), at[3]) / volume,
+                                  dot(cross(at[0], at[1]), at[3]) / volume,
+                                  dot(cross(at[1], at[0]), at[2]) / volume};
+    weights[0] = 1 - weights[1] - weights[2] - weights[3];
+    return weights;
+}
 
 enum class Fault { none, overshoot, inaccurate, wrongCellValue, wrongValidity };
 
@@ -50,7 +80,7 @@ class Owner {
     const Candidate& candidate() const { return candidate_; }
 
     /// @param uninteresting a ratio at or below this need not be exact, only not too small.
-    Fit fit(const Channel& channel, float value, double uninteresting) {
+    Fit fit(Channel& channel, float value, double uninteresting) {
         if (channel.field->location == FieldLocation::cell) return fitCell(channel, value);
         const std::array<double, 4> nodes = nodeValues(channel);
         if (!std::all_of(nodes.begin(), nodes.end(), [](double f) { return std::isfinite(float(f)); }))
@@ -68,7 +98,7 @@ class Owner {
         return {ratio <= 1 ? Fault::none : Fault::inaccurate, ratio};
     }
 
-    std::string describe(const Channel& channel) {
+    std::string describe(Channel& channel) {
         const auto& tet = oracle_->mesh().tets[std::size_t(candidate_.element)];
         std::string text =
             format("    element %d: depth %.6g, distance %.6g voxel%s;", candidate_.element,
@@ -106,11 +136,14 @@ class Owner {
         return values;
     }
 
-    /// At the element's nearest point, within 2^-47 of the largest node value.
+    /// At the element's nearest point, within 2^-29 of the largest node value: far below what float allows.
     double interpolate(const std::array<double, 4>& nodes) {
         if (!weights_) {
             weights_.emplace();
-            if (candidate_.contains) {
+            if (const auto quick = candidate_.contains ? quickBarycentrics(*oracle_, candidate_.element, p_)
+                                                       : std::nullopt) {
+                *weights_ = *quick;
+            } else if (candidate_.contains) {
                 *weights_ = oracle_->approximateBarycentrics(candidate_.element, p_);
             } else {
                 const ExactWeights exactWeights = oracle_->nearest(candidate_.element, p_).weights;
@@ -127,10 +160,15 @@ class Owner {
         return oracle_->interpolate(*channel.field, channel.component, candidate_.element, weights);
     }
 
-    double gradient(const Channel& channel) const {
-        const mpq_class square =
-            oracle_->squaredGradient(*channel.field, channel.component, candidate_.element);
-        return std::sqrt(approximateRatio(square.get_num(), square.get_den()));
+    double gradient(Channel& channel) const {
+        if (channel.gradients.empty()) channel.gradients.assign(oracle_->mesh().tets.size(), -1);
+        double& gradient = channel.gradients[std::size_t(candidate_.element)];
+        if (gradient < 0) {
+            const mpq_class square =
+                oracle_->squaredGradient(*channel.field, channel.component, candidate_.element);
+            gradient = std::sqrt(approximateRatio(square.get_num(), square.get_den()));
+        }
+        return gradient;
     }
 
     const Oracle* oracle_;
@@ -149,7 +187,8 @@ class Checker {
         for (const int f : fields) {
             const Field& field = oracle.mesh().fields[std::size_t(f)];
             for (int c = 0; c < field.components; ++c)
-                channels_.push_back({&field, c, FormatAllowance(bounds.format, finiteFloatRange(field, c))});
+                channels_.push_back(
+                    {&field, c, FormatAllowance(bounds.format, finiteFloatRange(field, c)), {}});
         }
         TESSERA_CHECK(block.box == reference.box, "block and reference are of different boxes");
         TESSERA_CHECK(block.channels == int(channels_.size()), "a block has a channel for every component");
@@ -282,7 +321,7 @@ class Checker {
     }
 
     /// The value fits an element that covers the point but isn't deep enough to own it.
-    bool isOfAnother(const Vec3i& p, std::size_t channel) const {
+    bool isOfAnother(const Vec3i& p, std::size_t channel) {
         for (const Candidate& candidate : reference_.candidatesOf(block_.offset(p))) {
             Owner owner(oracle_, candidate, p, bounds_);
             if (owner.fit(channels_[channel], valueAt(channel, p), 0).passes()) return true;

@@ -54,16 +54,24 @@ void orient(TetMesh& mesh) {
     }
 }
 
-/// Turns by fixed angles about z, then x.
-Vec3d turned(const Vec3d& p, double aboutZ, double aboutX) {
-    const double cz = std::cos(aboutZ), sz = std::sin(aboutZ), cx = std::cos(aboutX), sx = std::sin(aboutX);
+/// Turns about z, then x, by angles that are given as the tangents of their halves: sines and cosines are
+/// then quotients, the same bit for bit with every mathematics library.
+Vec3d turned(const Vec3d& p, double halfTangentZ, double halfTangentX) {
+    const double z = halfTangentZ * halfTangentZ, x = halfTangentX * halfTangentX;
+    const double cz = (1 - z) / (1 + z), sz = 2 * halfTangentZ / (1 + z);
+    const double cx = (1 - x) / (1 + x), sx = 2 * halfTangentX / (1 + x);
     const Vec3d q{cz * p.x - sz * p.y, sz * p.x + cz * p.y, p.z};
     return {q.x, cx * q.y - sx * q.z, sx * q.y + cx * q.z};
 }
 
+/// The tangent of half an angle from -143 to 143 degrees.
+double randomHalfTangent(Random& random) {
+    return 3 * random.centred();
+}
+
 double graded(double u, double power) {
     const double t = 2 * u - 1;
-    return 0.5 + std::copysign(std::pow(std::abs(t), power), t) / 2;
+    return 0.5 + (power == 1 ? t : std::copysign(std::pow(std::abs(t), power), t)) / 2;
 }
 
 }  // namespace
@@ -163,7 +171,7 @@ TetMesh thinTetsMesh(ThinKind kind, double aspect, double size, int count, std::
                 at = {{{1, 0, 0}, {-0.5, 0.8, 0}, {-0.5, -0.8, 0}, {0.1, 0.05, wobble(aspect)}}};
                 break;
         }
-        const double aboutZ = 6.3 * random.unit(), aboutX = 6.3 * random.unit();
+        const double aboutZ = randomHalfTangent(random), aboutX = randomHalfTangent(random);
         const Vec3d centre = random.place();
         const auto first = std::int32_t(mesh.points.size());
         for (const Vec3d& p : at) mesh.points.push_back(centre + 0.5 * size * turned(p, aboutZ, aboutX));
@@ -175,7 +183,7 @@ TetMesh thinTetsMesh(ThinKind kind, double aspect, double size, int count, std::
 TetMesh thinClusterMesh(double aspect, int squeezedAxes, int points, std::uint64_t seed) {
     TetMesh mesh = gradedDelaunayMesh(points, 1, seed);
     Random random(seed + 1);
-    const double aboutZ = 6.3 * random.unit(), aboutX = 6.3 * random.unit();
+    const double aboutZ = randomHalfTangent(random), aboutX = randomHalfTangent(random);
     for (Vec3d& p : mesh.points) {
         p -= 0.5;
         p.z *= aspect;
@@ -256,7 +264,7 @@ void appendMesh(TetMesh& mesh, const TetMesh& other) {
 
 void place(TetMesh& mesh, const Placement& placement) {
     for (Vec3d& p : mesh.points) {
-        if (placement.isTurned) p = turned(p, 0.7, 1.9);
+        if (placement.isTurned) p = turned(p, 0.365, 1.398);
         p = p * placement.scale + placement.offsetWorld;
     }
 }

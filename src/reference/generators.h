@@ -7,7 +7,7 @@
 #include "mesh/tet_mesh.h"
 
 // Meshes for tests and benchmarks: no fields, the same on every run and platform but for the last bits of
-// std::pow and std::sin.
+// std::pow in meshes graded by a power other than 1.
 
 namespace tessera {
 
