@@ -16,6 +16,9 @@ namespace tessera::contract {
 /// How much of the suite to run: 1 in a plain build, less under sanitizers; TESSERA_CONTRACT_SCALE overrides.
 double scale();
 
+/// Under sanitizers in continuous integration, and on emulated devices when every test runs.
+bool isHurried();
+
 /// `points` lattice points along an axis, fewer at a smaller scale.
 int scaledPoints(int points);
 
@@ -46,6 +49,8 @@ inline void PrintTo(const Subject& subject, std::ostream* out) {
 std::vector<Subject> subjectsOf(const Resampler& resampler);
 std::vector<Subject> subjectsOf(std::span<const Resampler* const> resamplers);
 
+/// The arithmetic of the first subject on another platform's device.
+bool isAnotherDevice(const Subject& subject);
 /// A subject's part of the lattices: all, or about half for one that isn't primary.
 bool takes(const Subject& subject, const LatticeCase& at);
 /// The lattices on which bits are compared and real meshes checked; fewer on a device, where every run has

@@ -27,19 +27,14 @@ const std::vector<Subject>& subjects() {
     return all;
 }
 
-/// Under sanitizers, and on emulated devices when every test runs.
-bool isHurried() {
-    return contract::scale() < 0.2;
-}
-
 using OnCase = std::tuple<Subject, HardCase>;
 
 class HardCases : public testing::TestWithParam<OnCase> {
   protected:
     void SetUp() override {
         TESSERA_CONTRACT_NEEDS(subject());
-        if (hardCase().isLarge && (!subject().isPrimary || isHurried())) GTEST_SKIP() << "large";
-        if (isHurried() && !subject().isPrimary && subject().format == SampleFormat::r32f)
+        if (hardCase().isLarge && (!subject().isPrimary || contract::isHurried())) GTEST_SKIP() << "large";
+        if (contract::isHurried() && contract::isAnotherDevice(subject()))
             GTEST_SKIP() << "another device of the same arithmetic";
         mesh_ = hardCase().make();
     }
@@ -174,7 +169,7 @@ Block assembled(const LatticeCase& at, const std::vector<Block>& parts) {
 class HardCaseHashes : public testing::TestWithParam<HardCase> {};
 
 TEST_P(HardCaseHashes, AreThoseListed) {
-    if (isHurried() && GetParam().isLarge) GTEST_SKIP() << "large";
+    if (contract::isHurried() && GetParam().isLarge) GTEST_SKIP() << "large";
     const TetMesh mesh = GetParam().make();
     const std::vector<int> fields = contract::allFields(mesh);
     const Resampler& software = findResampler("software");
