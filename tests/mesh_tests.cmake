@@ -1,6 +1,7 @@
 tessera_test(mesh_test LINK mesh PRIVATE_LINK tessera_gmp)
 tessera_test(split_test LINK mesh)
 tessera_test(mirror_test LINK mesh)
+tessera_test(repair_test LINK reference PRIVATE_LINK tessera_gmp)
 tessera_test(plane_query_test LINK reference PRIVATE_LINK tessera_gmp)
 tessera_test(cut_plane_test LINK reference registry)
 if(TESSERA_BUILD_IO)
