@@ -8,6 +8,7 @@
 
 #include "base/timer.h"
 #include "io/read_mesh.h"
+#include "mesh/mesh_quality.h"
 #include "mesh/repair.h"
 #include "mesh_test_tools.h"
 
@@ -79,6 +80,12 @@ void expectRepaired(const std::string& path, double minAspect) {
     printCounts("before", report.before);
     printCounts("after", report.after);
     ASSERT_NO_THROW(checkMesh(repaired));
+    const MeshQuality was = measureQuality(mesh, {}), is = measureQuality(repaired, {});
+    std::printf("  boundary faces %lld > %lld, non-conforming faces %lld > %lld\n",
+                static_cast<long long>(was.boundaryFaces), static_cast<long long>(is.boundaryFaces),
+                static_cast<long long>(was.nonConformingFaces),
+                static_cast<long long>(is.nonConformingFaces));
+    EXPECT_LE(is.nonConformingFaces, was.nonConformingFaces);
     EXPECT_EQ(test::countInverted(repaired), 0);
     EXPECT_LE(report.relativeVolumeChange(), 1e-6);
     EXPECT_FALSE(report.rangesGrew());

@@ -149,32 +149,28 @@ std::int64_t ClassCounts::degenerate() const {
     return sum;
 }
 
-ClassCounts countClasses(const TetMesh& mesh, const ClassLimits& limits, const Execution& execution) {
+ClassCounts countClasses(const TetMesh& mesh, const ClassLimits& limits, const Execution& execution,
+                         std::vector<std::int32_t>* degenerate) {
+    struct Part {
+        ClassCounts counts;
+        std::vector<std::int32_t> degenerate;
+    };
     const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
-    std::vector<ClassCounts> parts{std::size_t(chunks)};
+    std::vector<Part> parts{std::size_t(chunks)};
     parallelFor(execution, chunks, [&](std::int64_t chunk) {
+        Part& part = parts[std::size_t(chunk)];
         const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kChunk);
-        for (std::int64_t e = chunk * kChunk; e < end; ++e)
-            ++parts[std::size_t(chunk)].of[std::size_t(classOf(cornersOf(mesh, e), limits))];
+        for (std::int64_t e = chunk * kChunk; e < end; ++e) {
+            const ElementClass found = classOf(cornersOf(mesh, e), limits);
+            ++part.counts.of[std::size_t(found)];
+            if (found != ElementClass::good) part.degenerate.push_back(std::int32_t(e));
+        }
     });
     ClassCounts all;
-    for (const ClassCounts& part : parts)
-        for (std::size_t c = 0; c < kElementClasses; ++c) all.of[c] += part.of[c];
-    return all;
-}
-
-std::vector<std::int32_t> findDegenerate(const TetMesh& mesh, const ClassLimits& limits,
-                                         const Execution& execution) {
-    const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
-    std::vector<std::vector<std::int32_t>> parts{std::size_t(chunks)};
-    parallelFor(execution, chunks, [&](std::int64_t chunk) {
-        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kChunk);
-        for (std::int64_t e = chunk * kChunk; e < end; ++e)
-            if (!(aspectOf(cornersOf(mesh, e)) >= limits.minAspect))
-                parts[std::size_t(chunk)].push_back(std::int32_t(e));
-    });
-    std::vector<std::int32_t> all;
-    for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+    for (const Part& part : parts) {
+        for (std::size_t c = 0; c < kElementClasses; ++c) all.of[c] += part.counts.of[c];
+        if (degenerate) degenerate->insert(degenerate->end(), part.degenerate.begin(), part.degenerate.end());
+    }
     return all;
 }
 

@@ -55,10 +55,8 @@ struct ClassCounts {
     std::int64_t operator[](ElementClass c) const { return of[std::size_t(c)]; }
     std::int64_t degenerate() const;  ///< all but the good ones
 };
-ClassCounts countClasses(const TetMesh& mesh, const ClassLimits& limits, const Execution& execution);
-
-/// Elements that aren't good, ascending.
-std::vector<std::int32_t> findDegenerate(const TetMesh& mesh, const ClassLimits& limits,
-                                         const Execution& execution);
+/// @param degenerate gets the elements that aren't good, ascending; may be null.
+ClassCounts countClasses(const TetMesh& mesh, const ClassLimits& limits, const Execution& execution,
+                         std::vector<std::int32_t>* degenerate = nullptr);
 
 }  // namespace tessera

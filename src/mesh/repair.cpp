@@ -365,10 +365,10 @@ TetMesh repair(TetMesh mesh, const RepairOptions& options, RepairReport& report,
     report.elementsBefore = mesh.elementCount();
     report.nodesBefore = mesh.nodeCount();
     report.volumeBeforeWorld = totalVolume(mesh, execution);
-    report.before = countClasses(mesh, options.limits, execution);
+    std::vector<std::int32_t> degenerate;
+    report.before = countClasses(mesh, options.limits, execution, &degenerate);
     report.inverted = turnInverted(mesh, execution);
-    if (report.before.degenerate() > 0) {
-        const std::vector<std::int32_t> degenerate = findDegenerate(mesh, options.limits, execution);
+    if (!degenerate.empty()) {
         report.ranges = rangesOf(mesh);
         // A bound of everything is none: rounding must not keep the last element.
         const double maxLossWorld = options.maxVolumeLoss < 1
