@@ -246,6 +246,75 @@ class BadInput(AppTest):
         self.reject(2, "noise.vdb", "info", "noise.vdb")
 
 
+class Repair(AppTest):
+    """The unit cube in two halves whose diagonals cross at z = 1/2, a flat sliver between them, and a lone needle."""
+
+    def setUp(self):
+        super().setUp()
+        points = [(x, y, z) for z in (0, 0.5, 1) for y in (0, 1) for x in (0, 1)]
+        lower = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]  # diagonal 4-7 on top
+        upper = [(5, 6, 8, 11), (4, 5, 6, 8), (7, 6, 5, 11), (9, 5, 8, 11), (10, 6, 8, 11)]  # diagonal 5-6 below
+        points += [(3, 0, 0), (3 + 1e-9, 0, 0), (3, 1e-9, 0), (3, 0, 1)]
+        self.cells = lower + upper + [(4, 5, 7, 6), (12, 13, 14, 15)]
+        self.thin = self.write("thin.vtu", vtu_text(points, self.cells, fields={"f": [p[0] + p[2] for p in points]}))
+
+    def test_counts_classes_without_a_repair(self):
+        report = self.report("info", self.thin)
+        self.assertEqual(report["classes"]["counts"]["flat"], 1)
+        self.assertEqual(report["classes"]["counts"]["needle"], 1)
+        self.assertNotIn("repair", report)
+        self.assertIn("1 needle, 1 flat", self.succeed("info", self.thin))
+
+    def test_removes_them_and_says_so(self):
+        repair = self.report("tets", self.thin, "-o", "tets.vtu", "--repair")["repair"]
+        self.assertEqual(repair["before"]["flat"], 1)
+        self.assertEqual(sum(n for name, n in repair["after"].items() if name != "good"), 0)
+        self.assertEqual(repair["operations"]["edge_pair_splits"], 1)
+        self.assertEqual(repair["operations"]["dropped"], 1)
+        self.assertAlmostEqual(repair["volume"][1], 1, 12)
+        again = self.report("info", "tets.vtu", "--repair")
+        self.assertFalse(again["repair"]["changed"])
+        self.assertEqual(again["mesh"]["non_conforming_faces"], 0)
+        self.assertEqual(again["mesh"]["inverted_elements"], 0)
+        self.assertIn("class", self.succeed("info", self.thin, "--repair"))
+
+    def test_verify_repairs_as_the_file_was(self):
+        self.succeed("resample", self.thin, "-o", "out.vdb", "--repair", "--refine", "uniform", "--resolution", "20")
+        self.assertIn("repaired", self.succeed("info", "out.vdb"))
+        self.assertEqual(self.report("info", "out.vdb")["repair"]["min_aspect"], 1e-6)
+        verified = self.report("verify", self.thin, "out.vdb")
+        self.assertTrue(verified["holds"])
+        self.assertEqual(verified["repair"]["before"]["flat"], 1)
+        self.succeed("resample", self.thin, "-o", "plain.vdb", "--refine", "uniform", "--resolution", "20")
+        self.assertNotIn("repair", self.report("info", "plain.vdb"))
+        self.assertNotIn("repair", self.report("verify", self.thin, "plain.vdb"))
+
+    def test_slice_and_compare_repair_too(self):
+        report = self.report("slice", self.thin, "-o", "cut.exr", "--resolution", "16", "--repair")
+        self.assertEqual(report["repair"]["before"]["flat"], 1)
+        report = self.report("compare", self.thin, "--algorithms", "software", "--resolution", "16", "--runs", "1", "--repair")
+        self.assertEqual(report["meshes"][0]["repair"]["before"]["flat"], 1)
+
+    def test_bound_on_volume_keeps_elements_and_warns(self):
+        result = self.run_tessera("info", self.thin, "--repair", "--repair-aspect", "0.5", "--json", "-")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("warning", result.stderr)
+        self.assertIn("--repair-max-volume-loss", result.stderr)
+        repair = json.loads(result.stdout)["repair"]
+        self.assertGreater(sum(repair["kept"].values()), 0)
+        self.assertLess(abs(repair["volume"][1] / repair["volume"][0] - 1), 1.001e-6)
+
+    def test_a_repair_that_leaves_nothing_is_an_error(self):
+        self.write("needle.vtu", vtu_text([(0, 0, 0), (1e-9, 0, 0), (0, 1e-9, 0), (0, 0, 1)], [(0, 1, 2, 3)]))
+        self.reject(2, "needle.vtu --repair-aspect", "info", "needle.vtu", "--repair", "--repair-max-volume-loss", "100%")
+
+    def test_options_out_of_range(self):
+        self.reject(2, "--repair-aspect", "info", self.thin, "--repair-aspect", "1e-3")
+        self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "0")
+        self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "thin")
+        self.reject(2, "--repair-max-volume-loss", "info", self.thin, "--repair", "--repair-max-volume-loss", "2")
+
+
 class FailingOutputs(AppTest):
     def test_not_writable(self):
         (self.folder / "folder.vdb").mkdir()

@@ -7,7 +7,7 @@
 #include "commands.h"
 #include "compare_text.h"
 #include "field_selection.h"
-#include "io/read_mesh.h"
+#include "import_mesh.h"
 #include "output_paths.h"
 #include "report_text.h"
 
@@ -34,6 +34,7 @@ class CompareRun {
   public:
     explicit CompareRun(const CompareArguments& arguments)
         : arguments_(arguments),
+          repair_(repairOptions(arguments.repair)),
           list_(listAlgorithms(arguments.algorithms, arguments.algorithm)),
           session_(arguments.common) {
         if (arguments.fields.empty()) return;
@@ -60,8 +61,8 @@ class CompareRun {
 
   private:
     Json compareOn(const std::string& path) {
-        const MeshFile file =
-            readMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, session_.execution);
+        const ImportedMesh file =
+            importMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, repair_, session_.execution);
         const FieldSelection selection = selectFields(file.mesh, choices_);
         const Box3d bounds = file.mesh.boundsWorld();
         const SamplingGrid grid = arguments_.spacing ? cubicGridOfSpacing(bounds, *arguments_.spacing)
@@ -76,7 +77,9 @@ class CompareRun {
         session_.print(arguments_.markdown
                            ? markdownRows(name, report)
                            : importText(path, file.statistics, bounds) + compareText(report) + "\n");
+        showRepair(path, file, repair_, session_);
         Json json{{"input", path}, {"mesh", meshJson(file.statistics, bounds, summarizeFields(file.mesh))}};
+        if (file.repair) json["repair"] = repairJson(file, repair_);
         json.update(compareJson(report));
         return json;
     }
@@ -91,6 +94,7 @@ class CompareRun {
     }
 
     const CompareArguments& arguments_;
+    std::optional<RepairOptions> repair_;
     AlgorithmList list_;
     Session session_;
     std::vector<FieldChoice> choices_;
@@ -126,6 +130,7 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
     command.add_flag("--markdown", a.markdown, "print one table in Markdown, one row a mesh and algorithm");
     command.add_option("--time-step", a.timeStep,
                        "files with several steps: which one, counted from 0 (default: the last)");
+    addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
     command.footer(
         "Samples the mesh by each algorithm on one lattice and compares coverage, values and times; checks "

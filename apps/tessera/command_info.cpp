@@ -6,7 +6,7 @@
 #include "base/timer.h"
 #include "commands.h"
 #include "gl_report.h"
-#include "io/read_mesh.h"
+#include "import_mesh.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
 #include "report_text.h"
@@ -49,6 +49,7 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
         file.tree.brickCells(), file.unitScale);
     if (!file.target.empty()) text += fmt::format("  sampled on {}\n", file.target);
     if (!file.sampleFormat.empty()) text += fmt::format("  sampled in format {}\n", file.sampleFormat);
+    if (!file.repair.empty()) text += fmt::format("  from a mesh that was repaired: {}\n", file.repair);
     if (file.boundsWorld) {
         const Box3d& b = *file.boundsWorld;
         text += fmt::format("  bounds ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})\n", b.min.x,
@@ -61,6 +62,7 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
     json["algorithm"] = file.algorithm;
     if (!file.target.empty()) json["target"] = file.target;
     if (!file.sampleFormat.empty()) json["sample_format"] = file.sampleFormat;
+    if (!file.repair.empty()) json["repair"] = Json::parse(encodeRepair(decodeRepair(file.repair)));
     json["criterion"] = file.criterion;
     json["layout"] = file.layout == VdbLayout::flat ? "flat" : "levels";
     json["unit_scale"] = file.unitScale;
@@ -75,16 +77,24 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
 
 Json showMesh(const InfoArguments& arguments, Session& session) {
     Timer timer;
-    const MeshFile file = readMesh(arguments.path, {{}, arguments.timeStep}, session.execution);
+    const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
+    const ImportedMesh file = importMesh(arguments.path, {{}, arguments.timeStep}, repair, session.execution);
     StageTimes times;
     times.readMs = timer.elapsedMs();
     const Box3d bounds = file.mesh.boundsWorld();
     const std::vector<FieldSummary> fields = summarizeFields(file.mesh);
-    session.print(importText(arguments.path, file.statistics, bounds) + fieldsText(fields));
+    const ClassLimits limits = repair ? repair->limits : ClassLimits{};
+    const ClassCounts classes =
+        file.repair ? file.repair->before : countClasses(file.mesh, limits, session.execution);
+    session.print(importText(arguments.path, file.statistics, bounds) + classesText(classes, limits) +
+                  fieldsText(fields));
+    showRepair(arguments.path, file, repair, session);
     if (arguments.common.jsonPath.empty()) return {};
     Json json = documentHead(arguments.path);
     json["stages"] = stagesJson(times);
     json["mesh"] = meshJson(file.statistics, bounds, fields);
+    json["classes"] = classesJson(classes, limits);
+    if (file.repair) json["repair"] = repairJson(file, repair);
     return json;
 }
 
@@ -95,6 +105,7 @@ void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
     command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
     command.add_option("--time-step", arguments.timeStep,
                        "files with several steps: which one, counted from 0 (default: the last)");
+    addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
     command.footer(
         "Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -\n  tessera info --gl");

@@ -8,9 +8,9 @@
 
 #include "base/error.h"
 #include "commands.h"
+#include "import_mesh.h"
 #include "io/atomic_file.h"
 #include "io/image.h"
-#include "io/read_mesh.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
 #include "registry/registry.h"
@@ -72,7 +72,7 @@ Outside readOutside(const PictureArguments& arguments, const VdbFile& file, cons
     }
     ReadOptions options;
     for (const OutputField& field : file.fields) options.fields.push_back(field.sourceName);
-    outside.mesh = readMesh(arguments.mesh, options, execution).mesh;
+    outside.mesh = importMesh(arguments.mesh, options, decodeRepair(file.repair), execution).mesh;
     for (const OutputField& output : file.fields) {
         const auto& fields = outside.mesh.fields;
         const auto found = std::find_if(fields.begin(), fields.end(), [&](const Field& field) {

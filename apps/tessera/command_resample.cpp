@@ -8,8 +8,8 @@
 #include "brick/measure_error.h"
 #include "commands.h"
 #include "field_selection.h"
+#include "import_mesh.h"
 #include "io/atomic_file.h"
-#include "io/read_mesh.h"
 #include "output_paths.h"
 #include "predict_cost.h"
 #include "registry/registry.h"
@@ -64,6 +64,7 @@ class ResampleRun {
     explicit ResampleRun(const ResampleArguments& arguments)
         : arguments_(arguments),
           settings_(checkedSettings(arguments)),
+          repair_(repairOptions(arguments.repair)),
           choice_(chooseResampler(arguments.algorithm.name, settings_.refine.bind)),
           resampler_(*choice_.resampler),
           session_(arguments.common) {
@@ -73,7 +74,7 @@ class ResampleRun {
     int run();
 
   private:
-    MeshFile read(const Step& step);
+    ImportedMesh read(const Step& step);
     RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection) const;
     VdbWriteOptions writeOptions() const;
     void surveySeries(const std::vector<Step>& steps);
@@ -91,6 +92,7 @@ class ResampleRun {
 
     const ResampleArguments& arguments_;
     ResampleSettings settings_;
+    std::optional<RepairOptions> repair_;
     ResamplerChoice choice_;
     const Resampler& resampler_;
     Session session_;
@@ -144,9 +146,9 @@ int ResampleRun::run() {
     return 0;
 }
 
-MeshFile ResampleRun::read(const Step& step) {
+ImportedMesh ResampleRun::read(const Step& step) {
     const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-    return readMesh(step.input, options, session_.execution);
+    return importMesh(step.input, options, repair_, session_.execution);
 }
 
 RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {
@@ -160,6 +162,7 @@ VdbWriteOptions ResampleRun::writeOptions() const {
     VdbWriteOptions options = settings_.write;
     options.maxFlatBytes = settings_.refine.maxMemoryBytes;
     options.boundsWorld = settings_.refine.boundsWorld;
+    options.repair = encodeRepair(repair_);
     return options;
 }
 
@@ -199,12 +202,13 @@ void ResampleRun::surveySpacing(const TetMesh& mesh) {
 Json ResampleRun::runStep(const Step& step) {
     StageTimes times;
     Timer timer;
-    const MeshFile file = read(step);
+    const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
     const FieldSelection selection = selectFields(file.mesh, settings_.fields);
     checkOutputFields(selection.outputs);
     const RefineOptions options = stepOptions(file.mesh, selection);
     session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
+    showRepair(step.input, file, repair_, session_);
 
     Json report{{"schema", 1},
                 {"program", "tessera"},
@@ -222,6 +226,7 @@ Json ResampleRun::runStep(const Step& step) {
                                   : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
     report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
+    if (file.repair) report["repair"] = repairJson(file, repair_);
     report.update(rest);
     report["peak_memory_bytes"] = peakMemoryBytes();
     allTimes_ += times;

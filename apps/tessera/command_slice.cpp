@@ -11,10 +11,10 @@
 #include "base/timer.h"
 #include "commands.h"
 #include "field_selection.h"
+#include "import_mesh.h"
 #include "io/atomic_file.h"
 #include "io/image.h"
 #include "io/image_exr.h"
-#include "io/read_mesh.h"
 #include "output_paths.h"
 #include "registry/registry.h"
 #include "report_text.h"
@@ -110,7 +110,7 @@ class SliceRun {
     std::vector<FieldChoice> choices_;
     ResamplerChoice choice_;
     Session session_;
-    MeshFile file_;
+    ImportedMesh file_;
     FieldSelection selection_;
     Cut cut_;
     CutSamples samples_;
@@ -190,6 +190,8 @@ std::vector<ExrAttribute> SliceRun::attributes() const {
         {"tesseraV", lattice.vWorld},
         {"tesseraNormal", cut_.normal},
         {"tesseraSpacing", cut_.frame.spacingWorld()}};
+    if (const std::string repair = encodeRepair(repairOptions(arguments_.repair)); !repair.empty())
+        all.push_back({"tesseraRepair", repair});
     if (!choice_.resampler->targetsAgree()) all.push_back({"tesseraTarget", samples_.target});
     if (const std::string format = lossyFormat(bind_); !format.empty())
         all.push_back({"tesseraSampleFormat", format});
@@ -237,7 +239,10 @@ void SliceRun::writePngFile() {
 int SliceRun::run() {
     checkUsage();
     Timer timer;
-    file_ = readMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, session_.execution);
+    const std::optional<RepairOptions> repair = repairOptions(arguments_.repair);
+    file_ = importMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, repair,
+                       session_.execution);
+    showRepair(arguments_.input, file_, repair, session_);
     times_.readMs = timer.elapsedMs();
     selection_ = selectFields(file_.mesh, choices_);
     exr_ ? selectAll() : selectForPng();
@@ -321,6 +326,7 @@ Json SliceRun::report() const {
                         {"boxes", cut_.hits.boxes},
                         {"touched", cut_.hits.touched},
                         {"hit", cut_.hits.elements.size()}};
+    if (file_.repair) json["repair"] = repairJson(file_, repairOptions(arguments_.repair));
     json["statistics"] = statisticsJson(samples_.statistics);
     json["peak_memory_bytes"] = peakMemoryBytes();
     return json;
@@ -377,6 +383,7 @@ void addSliceOptions(CLI::App& command, SliceArguments& a) {
                     ".png: values a,b at the ends of the colour map (default: those of the cut)")
         ->group(what);
     addAlgorithmOptions(command, a.algorithm);
+    addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
     command.footer(
         "Pixels outside the mesh hold 0 and coverage 0; a value that isn't finite is NaN.\n"

@@ -2,8 +2,8 @@
 
 #include "base/timer.h"
 #include "commands.h"
+#include "import_mesh.h"
 #include "io/atomic_file.h"
-#include "io/read_mesh.h"
 #include "output_paths.h"
 #include "report_text.h"
 
@@ -14,6 +14,7 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
     command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra")->required();
     command.add_option("--time-step", arguments.timeStep,
                        "files with several steps: which one, counted from 0 (default: the last)");
+    addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
     command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
 }
@@ -24,25 +25,29 @@ int runTets(const TetsArguments& arguments) {
     Session session(arguments.common);
     checkWritable(arguments.output);
     Timer timer;
-    const MeshFile file = readMesh(arguments.input, {{}, arguments.timeStep}, session.execution);
+    const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
+    const ImportedMesh file =
+        importMesh(arguments.input, {{}, arguments.timeStep}, repair, session.execution);
     StageTimes times;
     times.readMs = timer.restart();
     session.execution.throwIfCancelled();
     writeTets(file.mesh, arguments.output);
     times.writeMs = timer.elapsedMs();
+    session.print(importText(arguments.input, file.statistics, file.mesh.boundsWorld()));
+    showRepair(arguments.input, file, repair, session);
     session.print(
-        importText(arguments.input, file.statistics, file.mesh.boundsWorld()) +
         fmt::format("{}: {} tetrahedra\n", arguments.output, formatCount(file.mesh.elementCount())));
     if (arguments.common.jsonPath.empty()) return 0;
-    writeJson(arguments.common.jsonPath,
-              Json{{"schema", 1},
-                   {"program", "tessera"},
-                   {"version", TESSERA_VERSION},
-                   {"command", "tets"},
-                   {"input", arguments.input},
-                   {"output", arguments.output},
-                   {"stages", stagesJson(times)},
-                   {"mesh", meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh))}});
+    Json json{{"schema", 1},
+              {"program", "tessera"},
+              {"version", TESSERA_VERSION},
+              {"command", "tets"},
+              {"input", arguments.input},
+              {"output", arguments.output},
+              {"stages", stagesJson(times)},
+              {"mesh", meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh))}};
+    if (file.repair) json["repair"] = repairJson(file, repair);
+    writeJson(arguments.common.jsonPath, json);
     return 0;
 }
 

@@ -8,7 +8,7 @@
 #include "brick/measure_error.h"
 #include "check_samples.h"
 #include "commands.h"
-#include "io/read_mesh.h"
+#include "import_mesh.h"
 #include "io/vdb_file.h"
 #include "registry/registry.h"
 #include "report_text.h"
@@ -149,7 +149,10 @@ int runVerify(const VerifyArguments& arguments) {
     options.timeStep = arguments.timeStep;
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
     Timer timer;
-    const TetMesh mesh = readMesh(arguments.meshPath, options, session.execution).mesh;
+    // The same repair as the file's mesh went through: only then do its claims speak of this mesh.
+    const std::optional<RepairOptions> repair = decodeRepair(file.repair);
+    const ImportedMesh imported = importMesh(arguments.meshPath, options, repair, session.execution);
+    const TetMesh& mesh = imported.mesh;
     StageTimes times;
     times.readMs = timer.restart();
     const std::vector<int> fields = matchFields(mesh, file, arguments.meshPath);
@@ -165,22 +168,26 @@ int runVerify(const VerifyArguments& arguments) {
     const bool holds = samples.good() &&
                        std::all_of(rows.begin(), rows.end(), [](const Comparison& r) { return r.holds(); });
 
+    showRepair(arguments.meshPath, imported, repair, session);
     session.print(fmt::format("{} against {}\n", arguments.vdbPath, arguments.meshPath) +
                   comparisonText(rows) + errorText(measured) + sampleText(samples) +
                   (holds ? "verified: the file's claims hold\n" : ""));
-    if (!arguments.common.jsonPath.empty())
-        writeJson(arguments.common.jsonPath, Json{{"schema", 1},
-                                                  {"program", "tessera"},
-                                                  {"version", TESSERA_VERSION},
-                                                  {"command", "verify"},
-                                                  {"mesh_file", arguments.meshPath},
-                                                  {"vdb_file", arguments.vdbPath},
-                                                  {"holds", holds},
-                                                  {"comparison", comparisonJson(rows)},
-                                                  {"samples", sampleJson(samples)},
-                                                  {"coverage", coverageJson(measured)},
-                                                  {"error", errorJson(measured)},
-                                                  {"stages", stagesJson(times)}});
+    if (!arguments.common.jsonPath.empty()) {
+        Json json{{"schema", 1},
+                  {"program", "tessera"},
+                  {"version", TESSERA_VERSION},
+                  {"command", "verify"},
+                  {"mesh_file", arguments.meshPath},
+                  {"vdb_file", arguments.vdbPath},
+                  {"holds", holds},
+                  {"comparison", comparisonJson(rows)},
+                  {"samples", sampleJson(samples)},
+                  {"coverage", coverageJson(measured)},
+                  {"error", errorJson(measured)},
+                  {"stages", stagesJson(times)}};
+        if (repair) json["repair"] = repairJson(imported, repair);
+        writeJson(arguments.common.jsonPath, json);
+    }
     if (!holds)
         throw InputError(
             fmt::format("{}: its claims do not hold for {}", arguments.vdbPath, arguments.meshPath));

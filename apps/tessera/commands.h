@@ -26,6 +26,7 @@ class Session {
 
 struct InfoArguments {
     CommonOptions common;
+    RepairArguments repair;
     std::string path;
     int timeStep = -1;
     bool gl = false;
@@ -38,6 +39,7 @@ struct VerifyArguments {
 };
 struct TetsArguments {
     CommonOptions common;
+    RepairArguments repair;
     std::string input, output;
     int timeStep = -1;
 };
@@ -52,6 +54,7 @@ struct PictureArguments {
 
 struct SliceArguments {
     CommonOptions common;
+    RepairArguments repair;
     AlgorithmArguments algorithm;
     std::string input, output, origin, normal = "0,0,1", up, size, fields, range;
     std::optional<int> component;
@@ -60,6 +63,7 @@ struct SliceArguments {
 };
 struct CompareArguments {
     CommonOptions common;
+    RepairArguments repair;
     std::vector<std::string> meshes;
     std::string algorithms, fields;  ///< empty: all
     AlgorithmArguments algorithm;    ///< its name is not used

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "import_mesh.h"
 
 namespace tessera {
 
@@ -263,6 +264,7 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     addRefineOptions(command, a);
     addOutputOptions(command, a);
     addAlgorithmOptions(command, a.algorithm);
+    addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
     command.footer(R"(Examples:
   tessera resample flow.vtu -o flow.vdb

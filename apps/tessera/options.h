@@ -33,12 +33,20 @@ struct AlgorithmArguments {
     std::string sampleFormat = "r32f", classification = "arithmetic";
 };
 
+/// --repair and what belongs to it, as typed.
+struct RepairArguments {
+    bool repair = false;
+    std::optional<double> aspect, angle;
+    std::string maxVolumeLoss;  ///< empty: the default
+};
+
 /// The words of `tessera resample`, as typed.
 struct ResampleArguments {
     CommonOptions common;
     std::string input, output;
     std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max";
     AlgorithmArguments algorithm;
+    RepairArguments repair;
     std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;
     std::optional<std::string> maxError;

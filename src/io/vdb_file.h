@@ -43,6 +43,7 @@ struct VdbWriteOptions {
     std::string algorithm, criterion, sourceFile;
     std::string target;        ///< the device, of algorithms whose results depend on it; else empty
     std::string sampleFormat;  ///< what values were kept in while sampling; empty: 32-bit floats
+    std::string repair;        ///< how the mesh was repaired before, as JSON; empty: it wasn't
 };
 
 /// What was written.
@@ -86,7 +87,7 @@ struct VdbFile {
     ErrorReport report;  ///< as stated in the file
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
-    std::string target, sampleFormat;  ///< as in VdbWriteOptions
+    std::string target, sampleFormat, repair;  ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
     bool halfFloat = false;            ///< values were rounded to half floats

@@ -413,6 +413,7 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.criterion = options.criterion;
     metadata.target = options.target;
     metadata.sampleFormat = options.sampleFormat;
+    metadata.repair = options.repair;
     metadata.unitScale = written.unitScale;
     metadata.upAxis = options.upAxis;
     metadata.halfFloat = options.halfFloat;
