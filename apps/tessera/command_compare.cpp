@@ -60,8 +60,7 @@ class CompareRun {
 
   private:
     Json compareOn(const std::string& path) {
-        const MeshFile file =
-            readMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, session_.execution);
+        const MeshFile file = session_.readMesh(path, {sourceNames(choices_, {}), arguments_.timeStep});
         const FieldSelection selection = selectFields(file.mesh, choices_);
         const Box3d bounds = file.mesh.boundsWorld();
         const SamplingGrid grid = arguments_.spacing ? cubicGridOfSpacing(bounds, *arguments_.spacing)

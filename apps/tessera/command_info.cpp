@@ -75,7 +75,7 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
 
 Json showMesh(const InfoArguments& arguments, Session& session) {
     Timer timer;
-    const MeshFile file = readMesh(arguments.path, {{}, arguments.timeStep}, session.execution);
+    const MeshFile file = session.readMesh(arguments.path, {{}, arguments.timeStep});
     StageTimes times;
     times.readMs = timer.elapsedMs();
     const Box3d bounds = file.mesh.boundsWorld();

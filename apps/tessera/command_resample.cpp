@@ -146,7 +146,7 @@ int ResampleRun::run() {
 
 MeshFile ResampleRun::read(const Step& step) {
     const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-    return readMesh(step.input, options, session_.execution);
+    return session_.readMesh(step.input, options);
 }
 
 RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {

@@ -237,7 +237,7 @@ void SliceRun::writePngFile() {
 int SliceRun::run() {
     checkUsage();
     Timer timer;
-    file_ = readMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, session_.execution);
+    file_ = session_.readMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep});
     times_.readMs = timer.elapsedMs();
     selection_ = selectFields(file_.mesh, choices_);
     exr_ ? selectAll() : selectForPng();

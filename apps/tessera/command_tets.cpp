@@ -24,7 +24,7 @@ int runTets(const TetsArguments& arguments) {
     Session session(arguments.common);
     checkWritable(arguments.output);
     Timer timer;
-    const MeshFile file = readMesh(arguments.input, {{}, arguments.timeStep}, session.execution);
+    const MeshFile file = session.readMesh(arguments.input, {{}, arguments.timeStep});
     StageTimes times;
     times.readMs = timer.restart();
     session.execution.throwIfCancelled();

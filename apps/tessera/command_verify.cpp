@@ -149,7 +149,7 @@ int runVerify(const VerifyArguments& arguments) {
     options.timeStep = arguments.timeStep;
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
     Timer timer;
-    const TetMesh mesh = readMesh(arguments.meshPath, options, session.execution).mesh;
+    const TetMesh mesh = session.readMesh(arguments.meshPath, options).mesh;
     StageTimes times;
     times.readMs = timer.restart();
     const std::vector<int> fields = matchFields(mesh, file, arguments.meshPath);

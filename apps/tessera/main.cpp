@@ -1,10 +1,13 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <limits>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "commands.h"
@@ -86,9 +89,24 @@ int run(const CLI::App& app, const Arguments& arguments) {
     return tessera::runPicture(arguments.picture);
 }
 
+/// What the process that reads a mesh runs; another tessera process is its only user.
+int readMeshForParent(const std::vector<std::string>& words) {
+    try {
+        return tessera::runReadMesh(words);
+    } catch (const tessera::InputError& error) {
+        printError(error.what());
+        return kExitBadInput;
+    } catch (const std::exception& error) {
+        printError(error.what());
+    }
+    return kExitFailure;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+    if (argc > 1 && std::string(argv[1]) == tessera::kReadMeshCommand)
+        _exit(readMeshForParent({argv + 2, argv + argc}));
     tessera::installInterruptHandlers();
     CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
     Arguments arguments;
