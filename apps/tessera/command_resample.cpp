@@ -10,6 +10,7 @@
 #include "field_selection.h"
 #include "io/atomic_file.h"
 #include "io/read_mesh.h"
+#include "memory_plan.h"
 #include "output_paths.h"
 #include "predict_cost.h"
 #include "registry/registry.h"
@@ -74,7 +75,7 @@ class ResampleRun {
 
   private:
     MeshFile read(const Step& step);
-    RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection) const;
+    RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection);
     VdbWriteOptions writeOptions() const;
     void surveySeries(const std::vector<Step>& steps);
     void surveySpacing(const TetMesh& mesh);
@@ -97,6 +98,7 @@ class ResampleRun {
     StageTimes allTimes_;
     Json series_;
     std::optional<FixedFrame> seriesFrame_;
+    SampleBudget budget_;  // of the step at hand
 };
 
 void widenRanges(std::vector<FieldSummary>& all, const std::vector<FieldSummary>& more) {
@@ -149,8 +151,13 @@ MeshFile ResampleRun::read(const Step& step) {
     return session_.readMesh(step.input, options);
 }
 
-RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {
+RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) {
     RefineOptions options = settings_.refine;
+    if (options.maxMemoryBytes > 0) {
+        budget_ = sampleBudget(options.maxMemoryBytes, mesh, selection.channels,
+                               settings_.write.layout == VdbLayout::flat);
+        options.maxMemoryBytes = budget_.levelsBytes;
+    }
     for (const std::string& name : settings_.errorFields)
         options.errorFields.push_back(findSelected(mesh, selection.fields, name));
     return options;
@@ -158,7 +165,7 @@ RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection
 
 VdbWriteOptions ResampleRun::writeOptions() const {
     VdbWriteOptions options = settings_.write;
-    options.maxFlatBytes = settings_.refine.maxMemoryBytes;
+    options.maxFlatBytes = budget_.flatBytes;
     options.boundsWorld = settings_.refine.boundsWorld;
     return options;
 }

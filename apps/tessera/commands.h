@@ -10,6 +10,8 @@ namespace tessera {
 
 /// The hidden subcommand that reads a mesh for another tessera process.
 inline constexpr const char* kReadMeshCommand = "read-mesh";
+/// To be called first in main: what is known of the process before it does anything.
+void noteStart();
 
 /// What a command runs with: threads, the flag that a signal raises, a progress bar, and how it reads.
 class Session {

@@ -10,6 +10,14 @@
 
 namespace tessera {
 
+namespace {
+int threadsAtStart = 0;
+}
+
+void noteStart() {
+    threadsAtStart = threadCount();
+}
+
 Session::Session(const CommonOptions& options)
     : progress(!options.quiet),
       prints_(!options.quiet && options.jsonPath != "-"),
@@ -27,7 +35,8 @@ Session::Session(const CommonOptions& options)
 
 MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
     if (!isolated_) return tessera::readMesh(path, options, execution);
-    return readMeshIsolated({"/proc/self/exe", {kReadMeshCommand}}, path, options, limits_, execution);
+    return readMeshIsolated({"/proc/self/exe", {kReadMeshCommand}, threadsAtStart}, path, options, limits_,
+                            execution);
 }
 
 int runReadMesh(const std::vector<std::string>& words) {

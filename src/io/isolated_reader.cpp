@@ -9,8 +9,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <memory>
 #include <new>
-#include <optional>
 
 #include "base/error.h"
 #include "base/timer.h"
@@ -38,12 +39,18 @@ std::string inSeconds(double seconds) {
 /// One reading by a child: its report arrives piece by piece.
 class IsolatedReading {
   public:
-    IsolatedReading(const std::string& path, const IsolationLimits& limits, const Execution& execution)
-        : path_(path), limits_(limits), execution_(execution) {}
+    /// @param given as the caller gave them: 0 for the usual ones.
+    IsolatedReading(const std::string& path, const IsolationLimits& given, const Execution& execution)
+        : path_(path), given_(given), usual_(defaultLimits(path)), limits_(usual_), execution_(execution) {
+        if (given.memoryBytes > 0) limits_.memoryBytes = given.memoryBytes;
+        if (given.seconds > 0) limits_.seconds = given.seconds;
+    }
 
     MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
 
   private:
+    std::unique_ptr<ReaderProcess> startProcess(const IsolatedReader& reader,
+                                                const ReadOptions& options) const;
     void awaitReport(ReaderProcess& process);
     bool receive(int descriptor);
     bool isComplete() const;
@@ -52,7 +59,7 @@ class IsolatedReading {
     [[noreturn]] void failWithGarbage(const std::string& why) const;
 
     const std::string& path_;
-    const IsolationLimits& limits_;
+    IsolationLimits given_, usual_, limits_;
     const Execution& execution_;
     std::vector<std::byte> report_;
 };
@@ -106,8 +113,11 @@ void IsolatedReading::awaitReport(ReaderProcess& process) {
         spentMs += std::min(timer.restart(), 5.0 * kTickMs);
         const double leftMs = limits_.seconds * 1e3 - spentMs;
         if (leftMs <= 0)
-            throw InputError(path_ + ": reading it took more than " + inSeconds(limits_.seconds) +
-                             ", the limit for a file like this; --max-read-time sets another");
+            throw InputError(
+                path_ + ": reading it took more than " + inSeconds(limits_.seconds) +
+                (given_.seconds > 0
+                     ? ", the limit given; for a file like this it would be " + inSeconds(usual_.seconds)
+                     : ", the limit for a file like this; --max-read-time sets another"));
         pollfd reports{process.reports(), POLLIN, 0};
         ::poll(&reports, 1, int(std::ceil(std::min(leftMs, double(kTickMs)))));
     }
@@ -122,8 +132,11 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
         case ReaderOutcome::internalError:
             throw InternalError(message);
         case ReaderOutcome::overLimit:
-            throw InputError(path_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) +
-                             " of memory, the limit for a file like this; --max-memory sets another");
+            throw InputError(
+                path_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
+                (given_.memoryBytes > 0
+                     ? "the limit given; for a file like this it would be " + inMiB(usual_.memoryBytes)
+                     : "the limit for a file like this; --max-memory sets another"));
         case ReaderOutcome::outOfMemory:
             throw std::bad_alloc();
         default:
@@ -131,19 +144,26 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
     }
 }
 
-MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
-    std::vector<std::string> words = reader.arguments;
+std::unique_ptr<ReaderProcess> IsolatedReading::startProcess(const IsolatedReader& reader,
+                                                             const ReadOptions& options) const {
     const std::vector<std::string> request =
         requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
+    if (reader.threadsAtStart > 0 && threadCount() == reader.threadsAtStart)
+        return std::make_unique<ReaderProcess>([&] { return serveMeshReader(request); });
+    std::vector<std::string> words = reader.arguments;
     words.insert(words.end(), request.begin(), request.end());
-    ReaderProcess process(reader.executable, words);
-    awaitReport(process);
+    return std::make_unique<ReaderProcess>(reader.executable, words);
+}
+
+MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
+    const std::unique_ptr<ReaderProcess> process = startProcess(reader, options);
+    awaitReport(*process);
     const ReportStart s = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof s);
     try {
         if (s.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
         if (s.outcome == ReaderOutcome::meshInMemory)
-            return readPacket(SealedMemory(process.mesh()).bytes(), execution_);
+            return readPacket(SealedMemory(process->mesh()).bytes(), execution_);
     } catch (const DamagedPacket& damage) {
         failWithGarbage(damage.what());
     }
@@ -152,16 +172,16 @@ MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& o
 
 }  // namespace
 
+int threadCount() {
+    std::error_code error;
+    const std::filesystem::directory_iterator threads("/proc/self/task", error);
+    return error ? 0 : int(std::distance(begin(threads), end(threads)));
+}
+
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
                           const IsolationLimits& limits, const Execution& execution) {
     execution.throwIfCancelled();
-    IsolationLimits bounds = limits;
-    if (bounds.memoryBytes <= 0 || bounds.seconds <= 0) {
-        const IsolationLimits usual = defaultLimits(path);
-        if (bounds.memoryBytes <= 0) bounds.memoryBytes = usual.memoryBytes;
-        if (bounds.seconds <= 0) bounds.seconds = usual.seconds;
-    }
-    return IsolatedReading(path, bounds, execution).run(reader, options);
+    return IsolatedReading(path, limits, execution).run(reader, options);
 }
 
 }  // namespace tessera

@@ -15,7 +15,15 @@ namespace tessera {
 struct IsolatedReader {
     std::string executable;
     std::vector<std::string> arguments;
+    /// When the program is the one that runs now: threadCount() at the start of its main. As long as there
+    /// are no more, the threads beside this one are sleepers that libraries start as they are loaded, and a
+    /// copy of the process (fork) reads: that spares the tenth of a second that loading the libraries takes.
+    /// 0: always start the program.
+    int threadsAtStart = 0;
 };
+
+/// Threads of this process; 0 where the system doesn't tell.
+int threadCount();
 
 /// Bounds on the reading process. 0 means one from the size of the file, see defaultLimits.
 struct IsolationLimits {

@@ -10,6 +10,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <new>
 #include <stdexcept>
@@ -17,6 +18,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "io/mesh_packet.h"
 
 namespace tessera {
 
@@ -37,6 +39,14 @@ Descriptor spareCopy(const Descriptor& descriptor) {
     return Descriptor(copy);
 }
 
+/// The terminal signals the whole group: what becomes of the child is its parent's decision.
+sigset_t maskOfChild() {
+    sigset_t blocked;
+    pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&blocked, number);
+    return blocked;
+}
+
 /// What posix_spawn does in the child.
 class SpawnPlan {
   public:
@@ -49,10 +59,7 @@ class SpawnPlan {
         error |= posix_spawn_file_actions_adddup2(&actions_, reports.get(), kReportDescriptor);
         error |= posix_spawn_file_actions_adddup2(&actions_, mesh.get(), kMeshDescriptor);
         error |= posix_spawn_file_actions_addclosefrom_np(&actions_, kMeshDescriptor + 1);
-        // The terminal signals the whole group: what becomes of the child is its parent's decision.
-        sigset_t blocked;
-        pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
-        for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&blocked, number);
+        const sigset_t blocked = maskOfChild();
         error |= posix_spawnattr_setsigmask(&attributes_, &blocked);
         error |= posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
         if (error != 0) {
@@ -84,6 +91,18 @@ class SpawnPlan {
     posix_spawnattr_t attributes_;
 };
 
+/// Leaves a copy of this process with the descriptors of a started program.
+void takeDescriptors(const Descriptor& reports, const Descriptor& mesh) {
+    const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+    bool done = nowhere >= 0;
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        done = done && ::dup2(nowhere, stream) == stream;
+    done = done && ::dup2(reports.get(), kReportDescriptor) == kReportDescriptor &&
+           ::dup2(mesh.get(), kMeshDescriptor) == kMeshDescriptor &&
+           ::close_range(kMeshDescriptor + 1, ~0U, 0) == 0;
+    if (!done) ::_exit(EXIT_FAILURE);
+}
+
 std::string describe(int status) {
     if (WIFEXITED(status))
         return "ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")";
@@ -111,7 +130,7 @@ SealedMemory::SealedMemory(int descriptor) {
     const int seals = ::fcntl(descriptor, F_GET_SEALS);
     struct stat status {};
     if (seals < 0 || (seals & kSeals) != kSeals || ::fstat(descriptor, &status) != 0)
-        throw std::runtime_error("its memory can't be sealed");
+        throw DamagedPacket("its memory can't be sealed");
     if (status.st_size == 0) return;
     const auto size = std::size_t(status.st_size);
     void* memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, descriptor, 0);
@@ -123,17 +142,45 @@ SealedMemory::~SealedMemory() {
     if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
 }
 
-ReaderProcess::ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments) {
+void ReaderProcess::open() {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) failToStart("pipe", errno);
     reports_ = Descriptor(ends[0]);
-    Descriptor childReports(ends[1]);
+    childReports_ = Descriptor(ends[1]);
     if (::fcntl(reports_.get(), F_SETFL, O_NONBLOCK) != 0) failToStart("pipe", errno);
     mesh_ = Descriptor(::memfd_create("tessera-mesh", MFD_CLOEXEC | MFD_ALLOW_SEALING));
     if (mesh_.get() < 0) failToStart("shared memory", errno);
-    childReports = spareCopy(childReports);
-    const Descriptor childMesh = spareCopy(mesh_);
-    child_ = SpawnPlan(childReports, childMesh).spawn(executable, arguments);
+    childReports_ = spareCopy(childReports_);
+    childMesh_ = spareCopy(mesh_);
+}
+
+ReaderProcess::ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments) {
+    open();
+    child_ = SpawnPlan(childReports_, childMesh_).spawn(executable, arguments);
+    childReports_.close();
+    childMesh_.close();
+}
+
+ReaderProcess::ReaderProcess(const std::function<int()>& work) {
+    open();
+    const sigset_t blocked = maskOfChild();
+    sigset_t before;
+    pthread_sigmask(SIG_SETMASK, &blocked, &before);
+    child_ = ::fork();
+    if (child_ == 0) {
+        takeDescriptors(childReports_, childMesh_);
+        int code = EXIT_FAILURE;
+        try {
+            code = work();
+        } catch (...) {  // nobody is left to tell
+        }
+        ::_exit(code);
+    }
+    const int error = errno;
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    childReports_.close();
+    childMesh_.close();
+    if (child_ < 0) failToStart("fork", error);
 }
 
 ReaderProcess::~ReaderProcess() {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,8 +32,8 @@ class Descriptor {
 /// A file in memory as read-only bytes that nobody can change any more.
 class SealedMemory {
   public:
-    /// Seals the file's size and content, then maps it. Throws std::runtime_error when somebody can still
-    /// write to it.
+    /// Seals the file's size and content, then maps it. Throws DamagedPacket when somebody can still write to
+    /// it.
     explicit SealedMemory(int descriptor);
     ~SealedMemory();
     SealedMemory(const SealedMemory&) = delete;
@@ -49,6 +50,9 @@ class ReaderProcess {
   public:
     /// Throws IoError when the program can't be started.
     ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments);
+    /// The same with a copy of this process, which runs `work` and ends with its result. No other thread may
+    /// hold a lock that `work` takes, but for those of the C library.
+    explicit ReaderProcess(const std::function<int()>& work);
     ~ReaderProcess();
     ReaderProcess(const ReaderProcess&) = delete;
     ReaderProcess& operator=(const ReaderProcess&) = delete;
@@ -61,7 +65,9 @@ class ReaderProcess {
 
   private:
     void kill();
+    void open();
 
+    Descriptor childReports_, childMesh_;  // until the child has them
     Descriptor reports_, mesh_;
     pid_t child_ = -1;
 };

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
+#include <exception>
 #include <new>
 #include <system_error>
 
@@ -26,8 +28,7 @@ namespace tessera {
 namespace {
 
 constexpr std::size_t kLongestMessage = 1 << 16;
-constexpr int kMostArenas = 2;
-constexpr std::int64_t kArenaBytes = 64 << 20;  // address space that malloc reserves for threads, used or not
+constexpr int kMostArenas = 1;                  // more reserve 64 MB of address space each
 constexpr std::int64_t kThreadBytes = 9 << 20;  // a thread's stack, used or not
 
 void writeAll(int descriptor, const void* bytes, std::size_t count) {
@@ -76,8 +77,8 @@ ReaderOutcome limitMemory([[maybe_unused]] const ReaderRequest& request) {
     ::mallopt(M_ARENA_MAX, kMostArenas);
     Execution execution;
     execution.threads = request.threads;
-    const auto bytes = rlim_t(addressSpaceBytes() + request.memoryBytes +
-                              2 * kArenaBytes * (kMostArenas - 1) + kThreadBytes * execution.threadCount());
+    const auto bytes =
+        rlim_t(addressSpaceBytes() + request.memoryBytes + kThreadBytes * execution.threadCount());
     if (!lowerLimit(RLIMIT_AS, bytes)) return ReaderOutcome::outOfMemory;
 #endif
     return ReaderOutcome::overLimit;
@@ -113,6 +114,20 @@ void handOver(MeshFile file) {
                 [](const void* data, std::size_t count) { writeAll(kReportDescriptor, data, count); });
 }
 
+ReaderOutcome memoryRanOut = ReaderOutcome::overLimit;
+
+/// Libraries allocate in destructors too, where a failure ends the program.
+[[noreturn]] void reportAndEnd() {
+    try {
+        if (const std::exception_ptr failure = std::current_exception()) std::rethrow_exception(failure);
+    } catch (const std::bad_alloc&) {
+        report(memoryRanOut, {});
+        ::_exit(0);
+    } catch (...) {
+    }
+    std::abort();
+}
+
 }  // namespace
 
 int serveMeshReader(std::span<const std::string> arguments, const MeshReader& read) {
@@ -120,7 +135,8 @@ int serveMeshReader(std::span<const std::string> arguments, const MeshReader& re
     if (::fcntl(kReportDescriptor, F_GETFD) < 0 || ::fcntl(kMeshDescriptor, F_GET_SEALS) < 0)
         throw InputError("the reader of meshes is started by tessera itself");
     settle(request);
-    const ReaderOutcome memoryRanOut = limitMemory(request);
+    memoryRanOut = limitMemory(request);
+    std::set_terminate(reportAndEnd);
     try {
         Execution execution;
         execution.threads = request.threads;
