@@ -812,7 +812,7 @@ class Reader(AppTest):
             line = self.reject(2, "grid.vtk memory", *command, "--max-memory", "40M")
             self.assertRegex(line, r"more than 40 MiB .* would be \d+ MiB")
         self.succeed("info", "grid.vtk")
-        line = self.resample_fails("--max-memory before", "grid.vtk", "--max-memory", "300M")
+        line = self.resample_fails("--max-memory before", "grid.vtk", "--max-memory", "250M")
         enough = line.split("--max-memory ")[-1].split()[0]
         self.succeed("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", enough, "--brick-size", "8")
         report = self.report("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", "600M")

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "base/error.h"
 #include "report_text.h"
 
@@ -11,11 +13,12 @@ namespace {
 
 // Measured on a mesh of a million elements and rounded up: the program with its libraries; what planning by
 // element size, the costliest, and sampling hold an element and a node; blocks in flight and write buffers.
-constexpr double kProgramBytes = 96 << 20;
+constexpr double kMiB = 1 << 20;
+constexpr double kProgramBytes = 96 * kMiB;
 constexpr double kBytesPerElement = 96, kBytesPerNode = 96;
-constexpr double kBlockBytes = 32 << 20, kBlockBytesPerChannel = 8 << 20;
+constexpr double kBlockBytes = 32 * kMiB, kBlockBytesPerChannel = 8 * kMiB;
 constexpr double kSampleShare = 0.8;  // the rest: what tiles and trees need beside values
-constexpr double kSmallestSamples = 4 << 20;
+constexpr double kSmallestSamples = 4 * kMiB;
 
 double meshBytes(const TetMesh& mesh) {
     double bytes =
@@ -33,12 +36,12 @@ SampleBudget sampleBudget(std::int64_t maxMemoryBytes, const TetMesh& mesh, int 
     const double left = (double(maxMemoryBytes) - work) * kSampleShare;
     if (left < kSmallestSamples)
         throw InputError(
-            fmt::format("--max-memory: {} is too little: {} elements, {} nodes and the work on them take {} "
-                        "before the first "
-                        "sample; --max-memory {}M would be enough for a coarse result",
-                        formatBytes(maxMemoryBytes), formatCount(mesh.elementCount()),
-                        formatCount(mesh.nodeCount()), formatBytes(std::int64_t(work)),
-                        std::int64_t((work + 2 * kSmallestSamples / kSampleShare) / (1 << 20)) + 1));
+            fmt::format("--max-memory: {} MiB is too little: {} elements, {} nodes and the work on them take "
+                        "{} MiB before "
+                        "the first sample; --max-memory {}M would be enough for a coarse result",
+                        std::int64_t(double(maxMemoryBytes) / kMiB), formatCount(mesh.elementCount()),
+                        formatCount(mesh.nodeCount()), std::int64_t(std::ceil(work / kMiB)),
+                        std::int64_t(std::ceil((work + 2 * kSmallestSamples / kSampleShare) / kMiB))));
     return {std::int64_t(flat ? left / 2 : left), std::int64_t(left / 2)};
 }
 

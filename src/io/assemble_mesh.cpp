@@ -283,7 +283,8 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     file.mesh.points = std::move(block.points);
     for (const AddedNode& node : split.addedNodes) {
         if (!std::isfinite(node.point.x) || !std::isfinite(node.point.y) || !std::isfinite(node.point.z))
-            throw InputError(path + ": the centre of a cell isn't finite: its coordinates are too large to add");
+            throw InputError(path +
+                             ": the centre of a cell isn't finite: its coordinates are too large to add");
         file.mesh.points.push_back(node.point);
     }
     statistics.addedNodes = std::int64_t(split.addedNodes.size());
