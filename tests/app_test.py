@@ -816,6 +816,109 @@ class Compare(AppTest):
         self.reject(2, "", "paper-tables", self.cube, "--max-size", "100")
 
 
+class Reader(AppTest):
+    """Meshes are read by a process of its own."""
+
+    def read_by_a_stopped_child(self, *options):
+        """A run of `info` and its child, stopped while it reads (or loads its libraries)."""
+        for _ in range(10):
+            process = subprocess.Popen([TESSERA, "info", self.stokes, *options], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            self.addCleanup(process.kill)
+            child = self.stop_child(process)
+            if child:
+                return process, child
+            process.communicate()
+        self.fail("no child was seen in ten runs")
+
+    def stop_child(self, process):
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        while process.poll() is None:
+            try:
+                for child in map(int, children.read_text().split()):
+                    os.kill(child, signal.SIGSTOP)
+                    return child
+            except OSError:
+                pass  # it ended between two of these lines
+        return None
+
+    def finish(self, process, child, code):
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, code, errors)
+        self.assertEqual(len(errors.splitlines()), 1, errors)
+        self.assertFalse(pathlib.Path(f"/proc/{child}").exists())
+        self.assertEqual(os.listdir(self.folder), ["cube.vtu"])
+        return errors
+
+    def test_both_readers_give_the_same_file(self):
+        files = set()
+        for options in ([], ["--reader", "isolated"], ["--reader", "in-process"]):
+            self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", *options)
+            files.add((self.folder / "out.vdb").read_bytes())
+        self.assertEqual(len(files), 1)
+
+    def test_a_crash_of_the_reader_is_one_line(self):
+        process, child = self.read_by_a_stopped_child()
+        os.kill(child, signal.SIGSEGV)
+        os.kill(child, signal.SIGCONT)
+        self.assertRegex(self.finish(process, child, 2), r"stokes_p1.vtu: the reader crashed \(signal 11")
+
+    def test_a_reader_that_takes_too_long_is_one_line(self):
+        process, child = self.read_by_a_stopped_child("--max-read-time", "1")
+        self.assertIn("stokes_p1.vtu: reading it took more than 1 s", self.finish(process, child, 2))
+
+    def test_interrupting_ends_the_reader_too(self):
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            process, child = self.read_by_a_stopped_child()
+            process.send_signal(number)
+            self.assertIn("interrupted", self.finish(process, child, code))
+
+    def test_too_little_memory_says_what_it_would_take(self):
+        # 60^3 points become over a million tetrahedra.
+        n = 60
+        head = f"# vtk DataFile Version 3.0\ngrid\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS {n} {n} {n}\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+        self.write("grid.vtk", (head + f"POINT_DATA {n**3}\nSCALARS f unsigned_char 1\nLOOKUP_TABLE default\n").encode() + bytes(n**3))
+        for command in (["info", "grid.vtk"], ["resample", "grid.vtk", "-o", "out.vdb"], ["tets", "grid.vtk", "-o", "out.vtu"]):
+            line = self.reject(2, "grid.vtk memory", *command, "--max-memory", "40M")
+            self.assertRegex(line, r"more than 40 MiB .* would be \d+ MiB")
+        self.succeed("info", "grid.vtk")
+        line = self.resample_fails("--max-memory before", "grid.vtk", "--max-memory", "250M")
+        enough = line.split("--max-memory ")[-1].split()[0]
+        self.succeed("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", enough, "--brick-size", "8")
+        report = self.report("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", "600M")
+        self.assertLess(report["peak_memory_bytes"], 600 << 20)
+
+    def test_bad_options(self):
+        for value in ("0", "-1", "nan", "inf", "soon"):
+            self.reject(2, "--max-read-time", "info", self.cube, f"--max-read-time={value}")
+        self.reject(2, "--reader", "info", self.cube, "--reader", "psychic")
+        self.reject(2, "--max-memory", "info", self.cube, "--max-memory", "lots")
+
+    def test_the_readers_own_command_is_hidden_and_useless_by_hand(self):
+        self.assertNotIn("read-mesh", self.succeed("--help"))
+        self.reject(2, "started by tessera itself", "read-mesh")
+        self.reject(2, "started by tessera itself", "read-mesh", "1", "1000", "1", "-1", self.cube)
+
+    def test_no_address_space_is_enough_or_one_line(self):
+        """Whatever memory there is: done, or one line and no file."""
+        seen = set()
+        for mebibytes in (300, 400, 500, 600, 700, 800, 1000, 1500):
+            def limit():
+                resource.setrlimit(resource.RLIMIT_AS, (mebibytes << 20, mebibytes << 20))
+
+            result = self.run_tessera("resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "300", "--threads", "1", preexec_fn=limit)
+            if result.returncode == 127:
+                continue  # not even the libraries can be loaded
+            seen.add(result.returncode)
+            self.assertIn(result.returncode, (0, 1), result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), result.returncode, result.stderr)
+            if result.returncode == 1:
+                self.assertIn("out of memory", result.stderr)
+            self.assertEqual((self.folder / "out.vdb").exists(), result.returncode == 0)
+            self.assertEqual(len(os.listdir(self.folder)), 2 - result.returncode)
+            (self.folder / "out.vdb").unlink(missing_ok=True)
+        self.assertTrue(seen)
+
+
 class Help(AppTest):
     def test_every_command_has_help_with_an_example(self):
         for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"]):

@@ -137,6 +137,134 @@ TEST(BadXml, CountsThatDoNotFitAreRefused) {
     expectRefused(folder.write("t.vtu", replaced(ascii, ">\n1 2 3 4\n", ">\n1 2 3\n")), {});
 }
 
+/// A file of one tetrahedron whose point field stands behind the markup, as `data`.
+std::string withAppended(const std::string& data, const std::string& rootAttributes = "",
+                         const std::string& offset = "0", const std::string& encoding = "raw") {
+    VtuText vtu = oneTet();
+    vtu.pointArrays.clear();
+    std::string text = replaced(
+        vtu.text(), "<PointData>",
+        "<PointData><DataArray type=\"Float64\" Name=\"f\" format=\"appended\" offset=\"" + offset + "\"/>");
+    text = replaced(text, "header_type=\"UInt64\"", rootAttributes + " header_type=\"UInt64\"");
+    return replaced(text, "</VTKFile>",
+                    "<AppendedData encoding=\"" + encoding + "\">_" + data + "</AppendedData></VTKFile>");
+}
+
+std::string bytesOf(std::initializer_list<std::uint64_t> words) {
+    std::string bytes;
+    for (const std::uint64_t word : words) bytes.append(reinterpret_cast<const char*>(&word), sizeof word);
+    return bytes;
+}
+
+TEST(DeclaredSize, AppendedArraysMustFitTheFile) {
+    const TemporaryFolder folder;
+    const std::string values(32, '\0');
+    EXPECT_EQ(
+        readMesh(folder.write("good.vtu", withAppended(bytesOf({32}) + values)), {}, {}).mesh.fields.size(),
+        1U);
+    for (const std::uint64_t size : {std::uint64_t(33), std::uint64_t(1) << 40, ~std::uint64_t(0)})
+        expectRefused(folder.write("a.vtu", withAppended(bytesOf({size}) + values)),
+                      {"'f'", "declares " + std::to_string(size) + " bytes", "byte"});
+    expectRefused(folder.write("b.vtu", withAppended(bytesOf({32}) + values, "", "41")),
+                  {"offset", "'41'", "40"});
+    expectRefused(folder.write("c.vtu", withAppended(bytesOf({32}) + values, "", "-1")), {"offset"});
+    expectRefused(folder.write("d.vtu", withAppended(bytesOf({32}) + values, "", "36")),
+                  {"'f'", "ends before"});
+}
+
+TEST(DeclaredSize, CompressedBlocksMustFitTheFile) {
+    const TemporaryFolder folder;
+    const std::string zlib = "compressor=\"vtkZLibDataCompressor\"", values(40, 'x');
+    const auto refuse = [&](std::initializer_list<std::uint64_t> head,
+                            const std::vector<std::string>& words) {
+        expectRefused(folder.write("z.vtu", withAppended(bytesOf(head) + values, zlib)), words);
+    };
+    refuse({999999999999, 32768, 0, 40}, {"'f'", "999999999999 blocks"});
+    refuse({~std::uint64_t(0), 32768, 0, 40}, {"'f'", "blocks"});
+    refuse({1, std::uint64_t(1) << 50, 0, 40}, {"'f'", "1 blocks of 1125899906842624 bytes"});
+    refuse({2, 1000, 5000, 40}, {"'f'", "blocks"});
+    expectRefused(folder.write("s.vtu", withAppended(bytesOf({3}), zlib)), {"'f'", "ends before its sizes"});
+    // base64: one block of 2^50 bytes.
+    expectRefused(folder.write("t.vtu", withAppended("AQAAAAAAAAAAAAAAAAAEAAAAAAAAAAAAKAAAAAAAAAA=", zlib,
+                                                     "0", "base64")),
+                  {"'f'", "1 blocks of 1125899906842624 bytes"});
+}
+
+TEST(DeclaredSize, CountsBeyondTheFileAreRefused) {
+    const TemporaryFolder folder;
+    const std::string ascii = oneTet().text();
+    expectRefused(
+        folder.write("a.vtu", replaced(ascii, "NumberOfCells=\"1\"", "NumberOfCells=\"999999999999\"")),
+        {"999999999999 cells", "bytes"});
+    expectRefused(folder.write("b.vtu", replaced(ascii, "Name=\"f\" NumberOfComponents=\"1\"",
+                                                 "Name=\"f\" NumberOfComponents=\"1000000000\"")),
+                  {"'f'", "1000000000 components"});
+}
+
+TEST(DeclaredSize, ExtentsBeyondTheFileAreRefused) {
+    const TemporaryFolder folder;
+    const auto grid = [&](const std::string& whole, const std::string& piece, const std::string& type,
+                          const std::string& inside) {
+        return "<VTKFile type=\"" + type + "\" version=\"0.1\"><" + type + " WholeExtent=\"" + whole +
+               "\"><Piece Extent=\"" + piece + "\">" + inside + "</Piece></" + type + "></VTKFile>";
+    };
+    const std::string points =
+        "<Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" format=\"ascii\">0 0 0 1 0 0 0 1 0 1 1 "
+        "0 0 0 1 "
+        "1 0 1 0 1 1 1 1 1</DataArray></Points>";
+    const std::string eight = "0 1 0 1 0 1";
+    EXPECT_EQ(readMesh(folder.write("good.vts", grid(eight, eight, "StructuredGrid", points)), {}, {})
+                  .mesh.nodeCount(),
+              8);
+    const std::string large = "0 999 0 999 0 999";
+    expectRefused(folder.write("a.vts", grid(large, large, "StructuredGrid", points)),
+                  {"1000000000", "bytes"});
+    expectRefused(folder.write("b.vts", grid(large, eight, "StructuredGrid", points)),
+                  {"WholeExtent", "1000000000"});
+    expectRefused(folder.write("c.vts", grid("0 99999 0 99999 0 99999", eight, "StructuredGrid", points)),
+                  {"WholeExtent", "2147483647"});
+    expectRefused(folder.write("d.vts", grid("0 9 0 9", eight, "StructuredGrid", points)), {"six"});
+    expectRefused(folder.write("e.vts", grid("0 99999999999 0 9 0 9", eight, "StructuredGrid", points)),
+                  {"six"});
+    const std::string field =
+        "<PointData><DataArray type=\"Float32\" Name=\"f\" format=\"ascii\">1 2</DataArray></PointData>";
+    expectRefused(folder.write("f.vti", grid(large, large, "ImageData", field)),
+                  {"'f'", "1000000000", "bytes"});
+    expectRefused(folder.write("g.vtr", grid(large, large, "RectilinearGrid", field)), {"'f'", "1000000000"});
+}
+
+TEST(DeclaredSize, FilesThatNameEachOtherEnd) {
+    const TemporaryFolder folder;
+    std::string names;
+    for (int i = 0; i < 200; ++i) names += "<DataSet index=\"" + std::to_string(i) + "\" file=\"a.vtm\"/>";
+    expectRefused(
+        folder.write("a.vtm",
+                     "<VTKFile type=\"vtkMultiBlockDataSet\" version=\"1.0\"><vtkMultiBlockDataSet>" + names +
+                         "</vtkMultiBlockDataSet></VTKFile>"),
+        {"8 deep"});
+    std::string tags;
+    for (int i = 0; i < 300000; ++i) tags += "<Piece";
+    expectRefused(folder.write("b.vtu", "<VTKFile type=\"UnstructuredGrid\">" + tags + "</VTKFile>"), {});
+}
+
+TEST(DeclaredSize, LegacyLinesMustFitTheFile) {
+    const TemporaryFolder folder;
+    const std::string head = "# vtk DataFile Version 3.0\nt\n";
+    const auto refuse = [&](const std::string& rest, const std::string& word) {
+        expectRefused(folder.write("l.vtk", head + rest), {word, "declares"});
+    };
+    const std::string cells = "0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+    refuse("ASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 1000000000000 double\n" + cells, "POINTS 1000000000000");
+    refuse("ASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 40 double\n" + cells, "POINTS 40");
+    refuse("BINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 40 double\n" + cells, "POINTS 40");
+    refuse("ASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n" + replaced(cells, "CELLS 1 5", "CELLS 1 60"),
+           "CELLS 1 60");
+    refuse("ASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 99999 99999 99999\nORIGIN 0 0 0\nSPACING 1 1 1\n",
+           "DIMENSIONS 99999 99999");
+    refuse("ASCII\nDATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 99999999 float\n0 1\n",
+           "X_COORDINATES 99999999");
+}
+
 TEST(BadXml, NodeIndicesOutOfRangeAreNamed) {
     const TemporaryFolder folder;
     VtuText vtu = oneTet();
@@ -270,10 +398,12 @@ TEST(BadTetgen, TheLineIsNamed) {
     refuse(replaced(nodes, "4 3 0 0", "4 2 0 0"), elements, {"m.node", "line 1", "dimension"});
     refuse(replaced(nodes, "4 3 0 0", "4000000 3 0 0"), elements, {"m.node", "line 1"});
     refuse(replaced(nodes, "0 0 0 0", "7 0 0 0"), elements, {"m.node", "line 2", "expected 0 or 1"});
+    refuse(replaced(nodes, "4 3 0 0", "9 3 0 0"), elements, {"m.node", "line 1", "declares 9"});
+    refuse(nodes, replaced(elements, "1 4 0", "3 4 0"), {"m.ele", "line 1", "declares 3"});
     refuse(nodes, replaced(elements, "0 1 2 3", "0 1 2 4"), {"m.ele", "line 2", "index 4", "0 to 3"});
     refuse(nodes, replaced(elements, "0 1 2 3", "0 1 2"), {"m.ele", "line 2"});
     refuse(nodes, replaced(elements, "1 4 0", "1 5 0"), {"m.ele", "line 1", "4 or 10"});
-    refuse(nodes, replaced(elements, "1 4 0", "2 4 0"), {"m.ele", "expected an element"});
+    refuse(nodes, replaced(elements, "1 4 0", "2 4 0") + "# a comment", {"m.ele", "expected an element"});
     refuse(nodes, "0 4 0\n", {"no 3D cells"});
     folder.write("lone.node", nodes);
     expectRefused(folder.file("lone.node"), {"lone.ele", "no such file"});

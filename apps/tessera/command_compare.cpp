@@ -62,7 +62,7 @@ class CompareRun {
   private:
     Json compareOn(const std::string& path) {
         const ImportedMesh file =
-            importMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, repair_, session_.execution);
+            importMesh(path, {sourceNames(choices_, {}), arguments_.timeStep}, repair_, session_);
         const FieldSelection selection = selectFields(file.mesh, choices_);
         const Box3d bounds = file.mesh.boundsWorld();
         const SamplingGrid grid = arguments_.spacing ? cubicGridOfSpacing(bounds, *arguments_.spacing)

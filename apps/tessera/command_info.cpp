@@ -78,7 +78,7 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
 Json showMesh(const InfoArguments& arguments, Session& session) {
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
-    const ImportedMesh file = importMesh(arguments.path, {{}, arguments.timeStep}, repair, session.execution);
+    const ImportedMesh file = importMesh(arguments.path, {{}, arguments.timeStep}, repair, session);
     StageTimes times;
     times.readMs = timer.elapsedMs();
     const Box3d bounds = file.mesh.boundsWorld();

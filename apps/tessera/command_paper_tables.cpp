@@ -77,7 +77,7 @@ class PaperTables {
     }
 
     int run() {
-        MeshFile file = readMesh(arguments_.mesh, {fieldNames(), -1}, session_.execution);
+        MeshFile file = session_.readMesh(arguments_.mesh, {fieldNames(), -1});
         field_ = chooseField(file.mesh);
         session_.print(importText(arguments_.mesh, file.statistics, file.mesh.boundsWorld()) +
                        fmt::format("  field {}, {} threads, median of {} {}\n",

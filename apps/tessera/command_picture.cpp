@@ -61,7 +61,7 @@ struct Outside {
     std::vector<int> fields;
 };
 
-Outside readOutside(const PictureArguments& arguments, const VdbFile& file, const Execution& execution) {
+Outside readOutside(const PictureArguments& arguments, const VdbFile& file, const Session& session) {
     Outside outside;
     if (arguments.mesh.empty()) {
         for (const OutputField& field : file.fields)
@@ -72,7 +72,7 @@ Outside readOutside(const PictureArguments& arguments, const VdbFile& file, cons
     }
     ReadOptions options;
     for (const OutputField& field : file.fields) options.fields.push_back(field.sourceName);
-    outside.mesh = importMesh(arguments.mesh, options, decodeRepair(file.repair), execution).mesh;
+    outside.mesh = importMesh(arguments.mesh, options, decodeRepair(file.repair), session).mesh;
     for (const OutputField& output : file.fields) {
         const auto& fields = outside.mesh.fields;
         const auto found = std::find_if(fields.begin(), fields.end(), [&](const Field& field) {
@@ -177,7 +177,7 @@ int runPicture(const PictureArguments& arguments) {
         throw InputError(fmt::format("{}: only files of layout levels can be drawn", arguments.input));
     const OutputField& field = chooseField(file, arguments.field);
     SliceOptions slice = sliceOptions(arguments, file);
-    const Outside outside = readOutside(arguments, file, session.execution);
+    const Outside outside = readOutside(arguments, file, session);
     if (!arguments.mesh.empty()) {
         // The mesh's own outline, by the cut plane through it.
         const SliceFrame frame = sliceFrame(file.tree, slice);

@@ -10,6 +10,7 @@
 #include "field_selection.h"
 #include "import_mesh.h"
 #include "io/atomic_file.h"
+#include "memory_plan.h"
 #include "output_paths.h"
 #include "predict_cost.h"
 #include "registry/registry.h"
@@ -75,7 +76,7 @@ class ResampleRun {
 
   private:
     ImportedMesh read(const Step& step);
-    RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection) const;
+    RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection);
     VdbWriteOptions writeOptions() const;
     void surveySeries(const std::vector<Step>& steps);
     void surveySpacing(const TetMesh& mesh);
@@ -99,6 +100,7 @@ class ResampleRun {
     StageTimes allTimes_;
     Json series_;
     std::optional<FixedFrame> seriesFrame_;
+    SampleBudget budget_;  // of the step at hand
 };
 
 void widenRanges(std::vector<FieldSummary>& all, const std::vector<FieldSummary>& more) {
@@ -148,11 +150,16 @@ int ResampleRun::run() {
 
 ImportedMesh ResampleRun::read(const Step& step) {
     const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-    return importMesh(step.input, options, repair_, session_.execution);
+    return importMesh(step.input, options, repair_, session_);
 }
 
-RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) const {
+RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) {
     RefineOptions options = settings_.refine;
+    if (options.maxMemoryBytes > 0) {
+        budget_ = sampleBudget(options.maxMemoryBytes, mesh, selection.channels,
+                               settings_.write.layout == VdbLayout::flat);
+        options.maxMemoryBytes = budget_.levelsBytes;
+    }
     for (const std::string& name : settings_.errorFields)
         options.errorFields.push_back(findSelected(mesh, selection.fields, name));
     return options;
@@ -160,7 +167,7 @@ RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection
 
 VdbWriteOptions ResampleRun::writeOptions() const {
     VdbWriteOptions options = settings_.write;
-    options.maxFlatBytes = settings_.refine.maxMemoryBytes;
+    options.maxFlatBytes = budget_.flatBytes;
     options.boundsWorld = settings_.refine.boundsWorld;
     options.repair = encodeRepair(repair_);
     return options;

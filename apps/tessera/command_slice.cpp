@@ -240,8 +240,7 @@ int SliceRun::run() {
     checkUsage();
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments_.repair);
-    file_ = importMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, repair,
-                       session_.execution);
+    file_ = importMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, repair, session_);
     showRepair(arguments_.input, file_, repair, session_);
     times_.readMs = timer.elapsedMs();
     selection_ = selectFields(file_.mesh, choices_);

@@ -26,8 +26,7 @@ int runTets(const TetsArguments& arguments) {
     checkWritable(arguments.output);
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
-    const ImportedMesh file =
-        importMesh(arguments.input, {{}, arguments.timeStep}, repair, session.execution);
+    const ImportedMesh file = importMesh(arguments.input, {{}, arguments.timeStep}, repair, session);
     StageTimes times;
     times.readMs = timer.restart();
     session.execution.throwIfCancelled();

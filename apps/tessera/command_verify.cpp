@@ -151,7 +151,7 @@ int runVerify(const VerifyArguments& arguments) {
     Timer timer;
     // The same repair as the file's mesh went through: only then do its claims speak of this mesh.
     const std::optional<RepairOptions> repair = decodeRepair(file.repair);
-    const ImportedMesh imported = importMesh(arguments.meshPath, options, repair, session.execution);
+    const ImportedMesh imported = importMesh(arguments.meshPath, options, repair, session);
     const TetMesh& mesh = imported.mesh;
     StageTimes times;
     times.readMs = timer.restart();

@@ -2,17 +2,26 @@
 
 #include <string>
 
+#include "io/isolated_reader.h"
 #include "options.h"
 #include "progress.h"
 
 namespace tessera {
 
-/// What a command runs with: threads, the flag that a signal raises, and a progress bar.
+/// The hidden subcommand that reads a mesh for another tessera process.
+inline constexpr const char* kReadMeshCommand = "read-mesh";
+/// To be called first in main: what is known of the process before it does anything.
+void noteStart();
+
+/// What a command runs with: threads, the flag that a signal raises, a progress bar, and how it reads.
 class Session {
   public:
     explicit Session(const CommonOptions& options);
     Execution execution;
     ProgressBar progress;
+
+    /// Reads a mesh, in a process of its own unless the options say otherwise. Throws as readMesh does.
+    MeshFile readMesh(const std::string& path, const ReadOptions& options) const;
 
     /// Prints to standard output, unless quiet or the JSON report goes there.
     void print(const std::string& text);
@@ -22,6 +31,8 @@ class Session {
 
   private:
     bool prints_;
+    bool isolated_;
+    IsolationLimits limits_;
 };
 
 struct InfoArguments {
@@ -96,5 +107,7 @@ int runPicture(const PictureArguments& arguments);
 int runCompare(const CompareArguments& arguments);
 int runPaperTables(const PaperTablesArguments& arguments);
 int runSlice(const SliceArguments& arguments);
+/// @param words those behind kReadMeshCommand.
+int runReadMesh(const std::vector<std::string>& words);
 
 }  // namespace tessera

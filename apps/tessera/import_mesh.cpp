@@ -127,11 +127,11 @@ std::optional<RepairOptions> repairOptions(const RepairArguments& a) {
 }
 
 ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
-                        const std::optional<RepairOptions>& options, const Execution& execution) {
-    ImportedMesh file{readMesh(path, read, execution), std::nullopt, 0};
+                        const std::optional<RepairOptions>& options, const Session& session) {
+    ImportedMesh file{session.readMesh(path, read), std::nullopt, 0};
     if (!options) return file;
     Timer timer;
-    file.mesh = repair(std::move(file.mesh), *options, file.repair.emplace(), execution);
+    file.mesh = repair(std::move(file.mesh), *options, file.repair.emplace(), session.execution);
     file.repairMs = timer.elapsedMs();
     if (file.mesh.tets.empty())
         throw InputError(fmt::format(

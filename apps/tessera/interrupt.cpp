@@ -38,6 +38,8 @@ void installInterruptHandlers() {
     // before it cleans up.
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
+    // Where it was ignored, how the process that reads a mesh ended could not be told.
+    signal(SIGCHLD, SIG_DFL);
 }
 
 const std::atomic<bool>& interruptFlag() {

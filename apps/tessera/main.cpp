@@ -1,14 +1,18 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <limits>
 #include <new>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "io/atomic_file.h"
 #include "output_paths.h"
 
 namespace {
@@ -86,10 +90,43 @@ int run(const CLI::App& app, const Arguments& arguments) {
     return tessera::runPicture(arguments.picture);
 }
 
+/// What the process that reads a mesh runs; another tessera process is its only user.
+int readMeshForParent(const std::vector<std::string>& words) {
+    try {
+        return tessera::runReadMesh(words);
+    } catch (const tessera::InputError& error) {
+        printError(error.what());
+        return kExitBadInput;
+    } catch (const std::exception& error) {
+        printError(error.what());
+    }
+    return kExitFailure;
+}
+
+/// Libraries allocate in destructors, where a failure ends the program: in order, without unfinished files.
+[[noreturn]] void endOutOfMemory() {
+    std::string line = "an exception escaped";
+    try {
+        if (const std::exception_ptr failure = std::current_exception()) std::rethrow_exception(failure);
+    } catch (const std::bad_alloc&) {
+        line = "out of memory";
+    } catch (const std::exception& error) {
+        line = error.what();
+    } catch (...) {
+    }
+    tessera::removeTemporaryFiles();
+    printError(line.c_str());
+    _exit(kExitFailure);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+    if (argc > 1 && std::string(argv[1]) == tessera::kReadMeshCommand)
+        _exit(readMeshForParent({argv + 2, argv + argc}));
+    tessera::noteStart();
     tessera::installInterruptHandlers();
+    std::set_terminate(endOutOfMemory);
     CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
     Arguments arguments;
     describe(app, arguments);

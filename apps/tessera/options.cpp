@@ -97,7 +97,10 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
         .add_option("--max-voxels", a.maxVoxels,
                     "bound on stored voxels, e.g. 500M (default: from the memory there is)")
         ->group(group);
-    command.add_option("--max-memory", a.maxMemory, "bound on the samples' memory, e.g. 4G")->group(group);
+    command
+        .add_option("--max-memory", a.common.reader.maxMemory,
+                    "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G")
+        ->group(group);
     command
         .add_flag("--dry-run", a.dryRun,
                   "print voxels, bytes and predicted time of each layout; write nothing")
@@ -193,9 +196,32 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     r.maxLevels = a.maxLevels.value_or(0);
     r.measure = a.errorMeasure == "rms" ? ErrorMeasure::rms : ErrorMeasure::max;
     if (!a.maxVoxels.empty()) r.maxVoxels = parseCount("--max-voxels", a.maxVoxels, false);
-    if (!a.maxMemory.empty()) r.maxMemoryBytes = parseCount("--max-memory", a.maxMemory, true);
+    if (!a.common.reader.maxMemory.empty())
+        r.maxMemoryBytes = parseCount("--max-memory", a.common.reader.maxMemory, true);
     if (!a.bounds.empty()) r.boundsWorld = parseBounds(a.bounds);
     return r;
+}
+
+/// Leaves --max-memory out where the command has it already.
+void addReaderOptions(CLI::App& command, ReaderArguments& a) {
+    const std::string group = "How to read the mesh";
+    command
+        .add_option(
+            "--reader", a.kind,
+            "isolated: in a process of its own, so that a damaged file can't crash or exhaust this one. "
+            "in-process: for debugging")
+        ->check(CLI::IsMember({"isolated", "in-process"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--max-read-time", a.maxSeconds,
+                    "seconds that reading may take (default: 6, and more for files above 8 MB)")
+        ->group(group);
+    if (!command.get_option_no_throw("--max-memory"))
+        command
+            .add_option("--max-memory", a.maxMemory,
+                        "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size)")
+            ->group(group);
 }
 
 }  // namespace
@@ -208,6 +234,7 @@ void addCommonOptions(CLI::App& command, CommonOptions& options) {
     command.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
     command.add_option("--json", options.jsonPath,
                        "write a report as JSON to this file, or to standard output for -");
+    addReaderOptions(command, options.reader);
 }
 
 void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {

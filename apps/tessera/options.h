@@ -13,11 +13,18 @@
 
 namespace tessera {
 
+/// How mesh files are read, as typed.
+struct ReaderArguments {
+    std::string kind = "isolated", maxMemory;  ///< maxMemory: empty for a bound from the file's size
+    std::optional<double> maxSeconds;
+};
+
 /// Options of every subcommand.
 struct CommonOptions {
     int threads = 0;  ///< 0: one for every processor
     bool quiet = false;
     std::string jsonPath;  ///< empty: no report; "-": standard output
+    ReaderArguments reader;
 };
 
 /// One entry of --field: a field of the mesh and the name of its grid.
@@ -56,7 +63,7 @@ struct ResampleArguments {
     double background = 0;
     std::optional<double> unitScale;  ///< not given: 1, or a power of ten when voxels are tiny
     int timeStep = -1;
-    std::string fields, errorFields, bounds, like, maxVoxels, maxMemory;
+    std::string fields, errorFields, bounds, like, maxVoxels;
     bool half = false;
     bool dryRun = false;
 };

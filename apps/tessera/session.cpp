@@ -1,16 +1,46 @@
+#include <fmt/format.h>
+
+#include <cmath>
 #include <cstdio>
 #include <string>
 
+#include "base/error.h"
 #include "commands.h"
 #include "interrupt.h"
 
 namespace tessera {
 
+namespace {
+int threadsAtStart = 0;
+}
+
+void noteStart() {
+    threadsAtStart = threadCount();
+}
+
 Session::Session(const CommonOptions& options)
-    : progress(!options.quiet), prints_(!options.quiet && options.jsonPath != "-") {
+    : progress(!options.quiet),
+      prints_(!options.quiet && options.jsonPath != "-"),
+      isolated_(options.reader.kind == "isolated") {
     execution.threads = options.threads;
     execution.cancel = &interruptFlag();
     execution.progress = &progress;
+    const ReaderArguments& reader = options.reader;
+    if (!reader.maxMemory.empty()) limits_.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
+    if (!reader.maxSeconds) return;
+    limits_.seconds = *reader.maxSeconds;
+    if (!std::isfinite(limits_.seconds) || limits_.seconds <= 0)
+        throw InputError(fmt::format("--max-read-time: expected a number above 0, got {}", limits_.seconds));
+}
+
+MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
+    if (!isolated_) return tessera::readMesh(path, options, execution);
+    return readMeshIsolated({"/proc/self/exe", {kReadMeshCommand}, threadsAtStart}, path, options, limits_,
+                            execution);
+}
+
+int runReadMesh(const std::vector<std::string>& words) {
+    return serveMeshReader(words);
 }
 
 void Session::print(const std::string& text) {

@@ -11,6 +11,12 @@ class InputError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
+/// Reading a file asked for more memory than there is: it is damaged, or too large.
+class TooLargeError : public InputError {
+  public:
+    using InputError::InputError;
+};
+
 /// The environment failed: a file that can't be written, a full disk.
 class IoError : public std::runtime_error {
   public:

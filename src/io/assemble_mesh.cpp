@@ -281,7 +281,12 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
         throw InputError(path + ": gives " + std::to_string(split.tets.size()) +
                          " tetrahedra; fewer than 2^30 are possible");
     file.mesh.points = std::move(block.points);
-    for (const AddedNode& node : split.addedNodes) file.mesh.points.push_back(node.point);
+    for (const AddedNode& node : split.addedNodes) {
+        if (!std::isfinite(node.point.x) || !std::isfinite(node.point.y) || !std::isfinite(node.point.z))
+            throw InputError(path +
+                             ": the centre of a cell isn't finite: its coordinates are too large to add");
+        file.mesh.points.push_back(node.point);
+    }
     statistics.addedNodes = std::int64_t(split.addedNodes.size());
     const bool everyCellIsItsTet = pureTets && split.tets.size() == block.cells.kinds.size();
     for (Field& field : block.fields) {

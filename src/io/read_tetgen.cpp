@@ -84,10 +84,10 @@ class NumberLines {
     std::int64_t lineNumber_ = 0;
 };
 
-std::int64_t readCount(NumberLines& lines, const char* what) {
+/// @param lineBytes of the shortest line that one item can have; the last one needs no end of line.
+std::int64_t readCount(NumberLines& lines, const char* what, double lineBytes) {
     const auto count = lines.read<std::int64_t>(what);
-    // Every item takes a line of 2 bytes at least.
-    if (count < 0 || count > std::int64_t(lines.bytes()))
+    if (count < 0 || double(count) * lineBytes > double(lines.bytes()) + 1)
         lines.fail("declares " + std::to_string(count) + " as " + what + ", the file has " +
                    std::to_string(lines.bytes()) + " bytes");
     return count;
@@ -97,7 +97,7 @@ std::int64_t readCount(NumberLines& lines, const char* what) {
 std::int64_t readNodes(const std::string& path, RawBlock& block) {
     NumberLines lines(path);
     lines.next("the number of nodes");
-    const std::int64_t count = readCount(lines, "number of nodes");
+    const std::int64_t count = readCount(lines, "number of nodes", 8);
     if (count == 0) lines.fail("there are 0 nodes; nodes in a .poly or .smesh file are not read");
     const auto dimension = lines.atEnd() ? 3 : lines.read<std::int64_t>("dimension");
     if (dimension != 3) lines.fail("dimension is " + std::to_string(dimension) + ", expected 3");
@@ -133,7 +133,7 @@ void readElements(const std::string& path, std::int64_t firstNode, RawBlock& blo
                   ImportStatistics& statistics) {
     NumberLines lines(path);
     lines.next("the number of elements");
-    const std::int64_t count = readCount(lines, "number of elements");
+    const std::int64_t count = readCount(lines, "number of elements", 10);
     const auto corners = lines.atEnd() ? 4 : lines.read<std::int64_t>("nodes per element");
     if (corners != 4 && corners != 10)
         lines.fail("nodes per element is " + std::to_string(corners) + ", expected 4 or 10");

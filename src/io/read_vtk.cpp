@@ -75,7 +75,7 @@ void selectArrays(vtkDataArraySelection* selection, FieldLocation location, cons
     }
 }
 
-OpenReader openXml(const std::string& path, const XmlFileInfo& info) {
+OpenReader openXml(const std::string& path, const DeclaredSize& info) {
     for (const XmlReaderKind& kind : kXmlReaders) {
         if (info.type != kind.type) continue;
         auto reader = kind.make();
@@ -148,7 +148,7 @@ OpenReader openLegacy(const std::string& path) {
     return {reader, "VTK legacy"};
 }
 
-OpenReader open(const std::string& path, VtkFormat format, const XmlFileInfo& info) {
+OpenReader open(const std::string& path, VtkFormat format, const DeclaredSize& info) {
     switch (format) {
         case VtkFormat::xml:
             return openXml(path, info);
@@ -192,7 +192,7 @@ void throwOnErrors(const std::string& path, const VtkMessages& messages) {
     if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
 }
 
-void checkCounts(const std::string& path, const XmlFileInfo& info, vtkDataObject* data) {
+void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObject* data) {
     if (info.type != "UnstructuredGrid") return;
     const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
     const auto cells = std::int64_t(data->GetNumberOfElements(vtkDataObject::CELL));
@@ -205,7 +205,7 @@ void checkCounts(const std::string& path, const XmlFileInfo& info, vtkDataObject
 RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options,
              const Execution& execution) {
     RawMesh raw;
-    XmlFileInfo info;
+    DeclaredSize info;
     if (format == VtkFormat::xml) info = checkXmlFile(path);
     if (format == VtkFormat::legacy) checkLegacyFile(path);
     if (format == VtkFormat::exodus) checkExodusFile(path);
@@ -241,7 +241,7 @@ RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& op
     try {
         return read(path, format, options, execution);
     } catch (const std::bad_alloc&) {
-        throw InputError(path + ": damaged or too large: reading it asked for more memory than there is");
+        throw TooLargeError(path + ": damaged or too large: reading it asked for more memory than there is");
     } catch (const std::length_error&) {
         throw InputError(path + ": damaged: it declares an impossible size");
     }

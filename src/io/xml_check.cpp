@@ -1,27 +1,26 @@
 #include "io/xml_check.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string_view>
 
 #include "base/error.h"
 #include "io/mapped_file.h"
+#include "io/xml_arrays.h"
+#include "io/xml_tags.h"
 
 namespace tessera {
 
 namespace {
 
 constexpr std::string_view kSpaces = " \t\r\n";
-
-XmlFileInfo checkXmlFile(const std::string& path, int depth);
-
-std::string quoted(std::string_view text) {
-    std::string result = "'";
-    for (const char c : text.substr(0, 24)) result += c >= ' ' && c < 127 ? c : '?';
-    return result + (text.size() > 24 ? "...'" : "'");
-}
+constexpr int kDeepest = 8;
+constexpr double kMostNodes = 2147483647;
+constexpr std::int64_t kMostCounted = std::int64_t(1) << 50;
 
 /// Skips blanks, comments and declarations from `at`.
 std::size_t skipProlog(std::string_view text, std::size_t at) {
@@ -43,63 +42,96 @@ std::size_t skipProlog(std::string_view text, std::size_t at) {
     }
 }
 
-/// Value of an attribute inside one tag.
-std::optional<std::string_view> attribute(std::string_view tag, std::string_view name) {
-    for (std::size_t at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
-        if (at == 0 || kSpaces.find(tag[at - 1]) == std::string_view::npos) continue;
-        std::size_t next = tag.find_first_not_of(kSpaces, at + name.size());
-        if (next == std::string_view::npos || tag[next] != '=') continue;
-        next = tag.find_first_not_of(kSpaces, next + 1);
-        if (next == std::string_view::npos || (tag[next] != '"' && tag[next] != '\'')) continue;
-        const std::size_t close = tag.find(tag[next], next + 1);
-        if (close == std::string_view::npos) return std::nullopt;
-        return tag.substr(next + 1, close - next - 1);
-    }
-    return std::nullopt;
+/// Adds without overflow: files may name each other many times.
+void addCount(std::int64_t& sum, std::int64_t count) {
+    sum = std::min(kMostCounted, sum + std::min(kMostCounted, count));
 }
 
-std::int64_t countAttribute(const std::string& path, std::string_view tag, std::string_view name,
-                            std::size_t byte) {
-    const auto text = attribute(tag, name);
+/// A box of grid points, as an attribute has it.
+struct Extent {
+    std::array<double, 3> points{};
+    double pointCount() const { return points[0] * points[1] * points[2]; }
+    double cellCount() const {
+        double count = pointCount() > 0 ? 1 : 0;
+        for (const double n : points) count *= std::max(1.0, n - 1);
+        return count;
+    }
+};
+
+class XmlCheck {
+  public:
+    explicit XmlCheck(std::map<std::string, DeclaredSize>& known) : known_(known) {}
+    DeclaredSize run(const std::string& path, int depth);
+
+  private:
+    /// One file while it is looked at.
+    struct File {
+        const std::string& path;
+        std::string_view text;
+        int depth;
+        XmlPacking packing;
+        std::optional<double> unpackedBound;  ///< the most bytes that the file can hold, unpacked
+        DeclaredSize size;
+        std::string_view section;  ///< "PointData", "Cells", ...
+        double piecePoints = 0, pieceCells = 0;
+        double wholePoints = -1;
+        double pointsOfPieces = 0;
+        bool pieceHasValues = false;
+    };
+
+    std::size_t checkFrame(File& file) const;
+    void checkTag(File& file, const XmlTag& tag);
+    void checkGrid(File& file, const XmlTag& tag) const;
+    void checkPiece(File& file, const XmlTag& tag) const;
+    void checkArray(File& file, const XmlTag& tag) const;
+    void checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute);
+    void checkSums(const File& file) const;
+    std::int64_t count(const File& file, const XmlTag& tag, std::string_view name) const;
+    std::optional<Extent> extent(const File& file, const XmlTag& tag, std::string_view name) const;
+
+    std::map<std::string, DeclaredSize>& known_;
+};
+
+std::int64_t XmlCheck::count(const File& file, const XmlTag& tag, std::string_view name) const {
+    const auto text = attributeOf(tag.text, name);
     if (!text) return 0;
     const std::size_t begin = std::min(text->find_first_not_of(kSpaces), text->size());
     std::int64_t value = -1;
     const auto result = std::from_chars(text->data() + begin, text->data() + text->size(), value);
     const bool onlyDigits = text->find_first_not_of("0123456789 \t\r\n") == std::string_view::npos;
     if (result.ec != std::errc() || !onlyDigits || value > (std::int64_t(1) << 40))
-        throw InputError(path + ": byte " + std::to_string(byte) + ": " + std::string(name) + " is " +
-                         quoted(*text) + ", expected a count");
+        throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": " + std::string(name) +
+                         " is " + quoted(*text) + ", expected a count");
     return value;
 }
 
-/// The most bytes that a file of this size can hold once unpacked, or nothing when there is no such bound.
-std::optional<double> unpackedBound(std::string_view root, std::size_t fileBytes) {
-    const std::string_view compressor = attribute(root, "compressor").value_or("");
-    if (compressor.empty()) return double(fileBytes);
-    if (compressor == "vtkZLibDataCompressor")
-        return double(fileBytes) * 1040;  // deflate's best ratio is 1032
-    if (compressor == "vtkLZ4DataCompressor") return double(fileBytes) * 256;
-    return std::nullopt;
-}
-
-/// Checks the files that a parallel or multi-block file names.
-void checkPieces(const std::string& path, std::string_view text, std::string_view tagName,
-                 std::string_view attributeName, int depth) {
-    for (std::size_t at = text.find(tagName); at != std::string_view::npos; at = text.find(tagName, at + 1)) {
-        const auto name = attribute(text.substr(at, text.find('>', at) - at), attributeName);
-        if (!name || name->empty()) continue;
-        const auto piece = std::filesystem::path(path).parent_path() / std::string(*name);
-        if (!std::filesystem::exists(piece))
-            throw InputError(path + ": byte " + std::to_string(at) + ": names " + piece.string() +
-                             ", which doesn't exist");
-        checkXmlFile(piece.string(), depth + 1);
+std::optional<Extent> XmlCheck::extent(const File& file, const XmlTag& tag, std::string_view name) const {
+    const auto text = attributeOf(tag.text, name);
+    if (!text) return std::nullopt;
+    const auto refuse = [&](const std::string& why) {
+        throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": " + std::string(name) +
+                         " is " + quoted(*text) + ", " + why);
+    };
+    std::array<std::int32_t, 6> ends{};
+    const char* next = text->data();
+    const char* end = next + text->size();
+    for (std::int32_t& number : ends) {
+        while (next < end && kSpaces.find(*next) != std::string_view::npos) ++next;
+        const auto result = std::from_chars(next, end, number);
+        if (result.ec != std::errc()) refuse("expected six 32-bit numbers");
+        next = result.ptr;
     }
+    Extent extent;
+    for (std::size_t a = 0; a < 3; ++a)
+        extent.points[a] = std::max(0.0, double(ends[2 * a + 1]) - double(ends[2 * a]) + 1);
+    if (extent.pointCount() > kMostNodes) refuse("more than 2147483647 points");
+    return extent;
 }
 
-XmlFileInfo checkXmlFile(const std::string& path, int depth) {
-    if (depth > 8) throw InputError(path + ": files name each other more than 8 deep");
-    const MappedFile file(path);
-    std::string_view text = file.bytes();
+/// Checks the file from its first to its last byte, and returns where the tags inside <VTKFile> begin.
+std::size_t XmlCheck::checkFrame(File& file) const {
+    const std::string& path = file.path;
+    const std::string_view text = file.text;
     const std::size_t start = skipProlog(text, text.starts_with("\xef\xbb\xbf") ? 3 : 0);
     if (!text.substr(start).starts_with("<VTKFile"))
         throw InputError(path + ": isn't a VTK XML file: byte " + std::to_string(start) + " has " +
@@ -108,8 +140,9 @@ XmlFileInfo checkXmlFile(const std::string& path, int depth) {
     if (rootEnd == std::string_view::npos)
         throw InputError(path + ": cut off at byte " + std::to_string(text.size()) + ", inside <VTKFile");
     const std::string_view root = text.substr(start, rootEnd - start);
-    const auto type = attribute(root, "type");
+    const auto type = attributeOf(root, "type");
     if (!type) throw InputError(path + ": <VTKFile has no type");
+    file.size.type = std::string(*type);
 
     const std::string_view endTag = "</VTKFile>";
     const std::size_t end = text.rfind(endTag);
@@ -120,60 +153,124 @@ XmlFileInfo checkXmlFile(const std::string& path, int depth) {
     if (after < text.size())
         throw InputError(path + ": damaged: byte " + std::to_string(after) + " has " +
                          quoted(text.substr(after)) + " after </VTKFile>");
+    const std::size_t appended = text.find("<AppendedData", rootEnd);
+    file.packing = packingOf(text, root, appended);
+    if (file.packing.largestRatio) file.unpackedBound = *file.packing.largestRatio * double(text.size());
+    return rootEnd;
+}
 
-    XmlFileInfo info;
-    info.type = std::string(*type);
-    const std::string_view markup = text.substr(0, text.find("<AppendedData", rootEnd));
-    for (std::size_t at = markup.find("<Piece", rootEnd); at != std::string_view::npos;
-         at = markup.find("<Piece", at + 1)) {
-        const std::string_view tag = markup.substr(at, markup.find('>', at) - at);
-        info.points += countAttribute(path, tag, "NumberOfPoints", at);
-        info.cells += countAttribute(path, tag, "NumberOfCells", at);
+/// <StructuredGrid WholeExtent="..."> and the like: VTK allocates for that box, whatever its pieces hold.
+void XmlCheck::checkGrid(File& file, const XmlTag& tag) const {
+    if (const auto whole = extent(file, tag, "WholeExtent")) file.wholePoints = whole->pointCount();
+}
+
+void XmlCheck::checkPiece(File& file, const XmlTag& tag) const {
+    file.section = {};
+    file.pieceHasValues = false;
+    if (const auto box = extent(file, tag, "Extent")) {
+        file.piecePoints = box->pointCount();
+        file.pieceCells = box->cellCount();
+        file.pointsOfPieces += file.piecePoints;
+        return;
     }
-    if (info.type.starts_with("P")) checkPieces(path, markup, "<Piece", "Source", depth);
-    if (info.type.starts_with("vtk")) checkPieces(path, markup, "<DataSet", "file", depth);
-    if (info.type != "UnstructuredGrid") return info;
+    const std::int64_t points = count(file, tag, "NumberOfPoints"), cells = count(file, tag, "NumberOfCells");
+    file.piecePoints = double(points);
+    file.pieceCells = double(cells);
+    addCount(file.size.points, points);
+    addCount(file.size.cells, cells);
+    addCount(file.size.cellsOfAll, cells);
+}
+
+/// An array's values take a byte each at least.
+void XmlCheck::checkArray(File& file, const XmlTag& tag) const {
+    const std::int64_t components = std::max<std::int64_t>(1, count(file, tag, "NumberOfComponents"));
+    double tuples = double(count(file, tag, "NumberOfTuples"));
+    if (file.section == "PointData" || file.section == "Points") tuples = file.piecePoints;
+    if (file.section == "CellData") tuples = file.pieceCells;
+    if (file.unpackedBound && double(components) * tuples > *file.unpackedBound)
+        throw InputError(file.path + ": damaged: byte " + std::to_string(tag.begin) + ": array " +
+                         quoted(attributeOf(tag.text, "Name").value_or("")) + " of " +
+                         std::to_string(std::int64_t(tuples)) + " values with " + std::to_string(components) +
+                         " components is more than " + std::to_string(file.text.size()) + " bytes can hold");
+    if (file.piecePoints == 0 || (file.section == "CellData" && tuples == 0)) return;
+    checkPackedArray(file.path, file.text, tag, file.packing);
+    if (file.wholePoints < 0 || file.pieceHasValues) return;
+    if (file.section != "PointData" && file.section != "CellData") return;
+    file.pieceHasValues = true;
+    addCount(file.size.gridPoints, std::int64_t(file.piecePoints));
+}
+
+void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute) {
+    const auto name = attributeOf(tag.text, attribute);
+    if (!name || name->empty()) return;
+    const auto piece = std::filesystem::path(file.path).parent_path() / std::string(*name);
+    std::error_code error;
+    if (!std::filesystem::exists(piece, error))
+        throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": names " + piece.string() +
+                         ", which doesn't exist");
+    const DeclaredSize size = run(piece.string(), file.depth + 1);
+    addCount(file.size.fileBytes, size.fileBytes);
+    addCount(file.size.cellsOfAll, size.cellsOfAll);
+    addCount(file.size.gridPoints, size.gridPoints);
+}
+
+void XmlCheck::checkTag(File& file, const XmlTag& tag) {
+    if (tag.name == file.size.type) {
+        checkGrid(file, tag);
+    } else if (tag.name == "Piece") {
+        if (!file.size.type.starts_with('P')) return checkPiece(file, tag);
+        if (const auto box = extent(file, tag, "Extent")) file.pointsOfPieces += box->pointCount();
+        checkNamedFile(file, tag, "Source");
+    } else if (tag.name == "DataSet" && file.size.type.starts_with("vtk")) {
+        checkNamedFile(file, tag, "file");
+    } else if (tag.name == "DataArray" || tag.name == "Array") {
+        checkArray(file, tag);
+    } else {
+        file.section = tag.name;
+    }
+}
+
+void XmlCheck::checkSums(const File& file) const {
+    const std::string& type = file.size.type;
+    // A piece of a parallel file may name the box of the whole.
+    if (file.depth == 0 && file.wholePoints > file.pointsOfPieces)
+        throw InputError(file.path + ": damaged: its WholeExtent has " +
+                         std::to_string(std::int64_t(file.wholePoints)) + " points, its pieces have " +
+                         std::to_string(std::int64_t(file.pointsOfPieces)));
     // A point takes 3 numbers and a cell a type, an offset and a node; each takes a byte at least.
-    const auto bound = unpackedBound(root, text.size());
-    if (bound && 3.0 * double(info.points) + 3.0 * double(info.cells) > *bound)
-        throw InputError(path + ": damaged: it declares " + std::to_string(info.points) + " points and " +
-                         std::to_string(info.cells) + " cells, more than " + std::to_string(text.size()) +
-                         " bytes can hold");
-    return info;
+    double numbers = 3 * double(file.size.points) + 3 * double(file.size.cells);
+    if (type == "StructuredGrid") numbers = 3 * file.pointsOfPieces;
+    if (file.unpackedBound && numbers > *file.unpackedBound)
+        throw InputError(file.path + ": damaged: it declares " +
+                         (type == "StructuredGrid"
+                              ? std::to_string(std::int64_t(file.pointsOfPieces)) + " points"
+                              : std::to_string(file.size.points) + " points and " +
+                                    std::to_string(file.size.cells) + " cells") +
+                         ", more than " + std::to_string(file.text.size()) + " bytes can hold");
+}
+
+DeclaredSize XmlCheck::run(const std::string& path, int depth) {
+    if (depth > kDeepest) throw InputError(path + ": files name each other more than 8 deep");
+    std::error_code error;
+    const std::string key = std::filesystem::weakly_canonical(path, error).string();
+    if (const auto before = known_.find(key); before != known_.end()) return before->second;
+    const MappedFile mapped(path);
+    File file{path, mapped.bytes(), depth, {}, {}, {}, {}, 0, 0, -1, 0, false};
+    file.size.fileBytes = std::int64_t(file.text.size());
+    const std::size_t inside = checkFrame(file);
+    const std::string_view markup = file.text.substr(0, file.text.find("<AppendedData", inside));
+    XmlTags tags(markup, inside);
+    while (const auto tag = tags.next()) checkTag(file, *tag);
+    checkSums(file);
+    known_[key] = file.size;
+    return file.size;
 }
 
 }  // namespace
 
-XmlFileInfo checkXmlFile(const std::string& path) {
-    return checkXmlFile(path, 0);
-}
-
-void checkLegacyFile(const std::string& path) {
-    const MappedFile file(path);
-    const std::string_view text = file.bytes();
-    if (!text.starts_with("# vtk DataFile Version"))
-        throw InputError(path + ": isn't a VTK file: it begins with " + quoted(text) +
-                         ", expected '# vtk DataFile Version'");
-    std::size_t at = 0;
-    for (int line = 0; line < 4 && at != std::string_view::npos; ++line)
-        at = text.find('\n', at == 0 ? 0 : at + 1);
-    if (at == std::string_view::npos && text.find("DATASET") == std::string_view::npos)
-        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) +
-                         ", inside the four lines of its head");
-    for (const std::string_view keyword :
-         {"\nPOINTS ", "\nCELLS ", "\nCELL_TYPES ", "\nPOINT_DATA ", "\nCELL_DATA "}) {
-        for (at = text.find(keyword); at != std::string_view::npos; at = text.find(keyword, at + 1)) {
-            std::int64_t count = 0;
-            const char* begin = text.data() + at + keyword.size();
-            const auto result = std::from_chars(begin, text.data() + text.size(), count);
-            // In binary data these letters may come up by chance: then no number follows.
-            if (result.ec == std::errc::invalid_argument) continue;
-            if (result.ec != std::errc() || count < 0 || count > std::int64_t(text.size()))
-                throw InputError(path + ": damaged: byte " + std::to_string(at + 1) + " declares " +
-                                 quoted(text.substr(at + 1, text.find('\n', at + 1) - at - 1)) +
-                                 ", more than " + std::to_string(text.size()) + " bytes can hold");
-        }
-    }
+DeclaredSize checkXmlFile(const std::string& path) {
+    std::map<std::string, DeclaredSize> known;
+    return XmlCheck(known).run(path, 0);
 }
 
 }  // namespace tessera

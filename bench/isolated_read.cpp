@@ -1,0 +1,127 @@
+// Times reading a mesh in this process against reading it in a process of its own, runs interleaved: in a
+// program that has threads, which starts the reader anew, and in fresh runs of `tessera info`, which fork it.
+// isolated_read mesh.vtu [--runs 9] [--threads 0] [--program build/release/apps/tessera/tessera]
+// [--csv bench/results/isolated_read.csv]
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "base/timer.h"
+#include "bench_statistics.h"
+#include "io/isolated_reader.h"
+
+namespace {
+
+using tessera::bench::medianOf;
+
+struct Options {
+    std::string meshPath, csvPath, program = TESSERA_PROGRAM;
+    int runs = 9, threads = 0;
+};
+
+/// Of this process and of the children that it has reaped.
+double processorMsOfAll() {
+    rusage usage{};
+    getrusage(RUSAGE_CHILDREN, &usage);
+    const auto ms = [](const timeval& t) { return double(t.tv_sec) * 1e3 + double(t.tv_usec) * 1e-3; };
+    return tessera::bench::processorMs() + ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+struct Sample {
+    double wallMs = 0, processorMs = 0;
+};
+
+template <class Read>
+Sample timeHere(const Read& read) {
+    const double before = processorMsOfAll();
+    const tessera::Timer timer;
+    const tessera::MeshFile file = read();
+    const double wallMs = timer.elapsedMs();
+    return {wallMs, processorMsOfAll() - before};
+}
+
+/// The reading stage of one run of the command line; its processor time is that of the whole run.
+Sample timeProgram(const Options& options, const std::string& reader) {
+    const std::string command = fmt::format("'{}' info '{}' --quiet --json - --threads {} --reader {}",
+                                            options.program, options.meshPath, options.threads, reader);
+    const double before = processorMsOfAll();
+    std::string text;
+    {
+        const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
+        if (!pipe) throw std::runtime_error("can't run " + command);
+        for (int c; (c = std::fgetc(pipe.get())) != EOF;) text += char(c);
+    }
+    return {nlohmann::json::parse(text).at("stages").at("read").get<double>(), processorMsOfAll() - before};
+}
+
+struct Pair {
+    std::string name;
+    std::vector<Sample> inProcess, isolated;
+};
+
+/// Prints a pair and returns its rows for the CSV.
+std::string report(const Options& options, const Pair& pair) {
+    const auto wall = [](const Sample& s) { return s.wallMs; };
+    const auto processor = [](const Sample& s) { return s.processorMs; };
+    const double wallIn = medianOf(pair.inProcess, wall), wallOut = medianOf(pair.isolated, wall);
+    const double busyIn = medianOf(pair.inProcess, processor), busyOut = medianOf(pair.isolated, processor);
+    fmt::print("{:<13} {:>12.1f} {:>12.1f} {:>8.1f} % {:>14.1f} {:>12.1f} {:>8.1f} %\n", pair.name, wallIn,
+               wallOut, 100 * (wallOut / wallIn - 1), busyIn, busyOut, 100 * (busyOut / busyIn - 1));
+    return fmt::format("{},{},{},{:.1f},{:.1f},{:.1f},{:.1f}\n", pair.name, options.runs, options.threads,
+                       wallIn, wallOut, busyIn, busyOut);
+}
+
+void compare(const Options& options) {
+    tessera::Execution execution;
+    execution.threads = options.threads;
+    const tessera::IsolatedReader reader{options.program, {"read-mesh"}};
+    Pair library{"library", {}, {}}, program{"command line", {}, {}};
+    for (int r = -1; r < options.runs; ++r) {  // the first round warms the file cache
+        const Sample samples[] = {
+            timeHere([&] { return tessera::readMesh(options.meshPath, {}, execution); }),
+            timeHere([&] { return tessera::readMeshIsolated(reader, options.meshPath, {}, {}, execution); }),
+            timeProgram(options, "in-process"), timeProgram(options, "isolated")};
+        if (r < 0) continue;
+        library.inProcess.push_back(samples[0]);
+        library.isolated.push_back(samples[1]);
+        program.inProcess.push_back(samples[2]);
+        program.isolated.push_back(samples[3]);
+    }
+    fmt::print(
+        "{}, median of {} interleaved runs, {} threads\n{:<13} {:>12} {:>12} {:>10} {:>14} {:>12} {:>10}\n",
+        options.meshPath, options.runs, execution.threadCount(), "", "in process", "isolated", "wall ms",
+        "in process", "isolated", "busy ms");
+    tessera::bench::writeText(
+        options.csvPath,
+        "start,runs,threads,in_process_ms,isolated_ms,in_process_busy_ms,isolated_busy_ms\n" +
+            report(options, library) + report(options, program));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Times reading a mesh in process against reading it in a process of its own.");
+    Options options;
+    app.add_option("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py")->required();
+    app.add_option("--program", options.program, "the tessera program");
+    app.add_option("--csv", options.csvPath, "also write the figures here");
+    app.add_option("--runs", options.runs)->check(CLI::Range(1, 1000));
+    app.add_option("--threads", options.threads)->check(CLI::Range(0, 1024));
+    CLI11_PARSE(app, argc, argv);
+    try {
+        compare(options);
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "isolated_read: {}\n", error.what());
+        return 1;
+    }
+    return 0;
+}

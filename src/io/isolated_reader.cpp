@@ -1,0 +1,187 @@
+#include "io/isolated_reader.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <new>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "io/mesh_packet.h"
+#include "io/reader_process.h"
+#include "io/reader_report.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kTickMs = 50;
+constexpr std::uint64_t kLongestMessage = 1 << 20;
+
+std::string inMiB(std::int64_t bytes) {
+    return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB";
+}
+
+std::string inSeconds(double seconds) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g s", seconds);
+    return text;
+}
+
+/// One reading by a child: its report arrives piece by piece.
+class IsolatedReading {
+  public:
+    /// @param given as the caller gave them: 0 for the usual ones.
+    IsolatedReading(const std::string& path, const IsolationLimits& given, const Execution& execution)
+        : path_(path), given_(given), usual_(defaultLimits(path)), limits_(usual_), execution_(execution) {
+        if (given.memoryBytes > 0) limits_.memoryBytes = given.memoryBytes;
+        if (given.seconds > 0) limits_.seconds = given.seconds;
+    }
+
+    MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
+
+  private:
+    std::unique_ptr<ReaderProcess> startProcess(const IsolatedReader& reader,
+                                                const ReadOptions& options) const;
+    void awaitReport(ReaderProcess& process);
+    bool receive(int descriptor);
+    bool isComplete() const;
+    ReportStart start() const;
+    [[noreturn]] void rethrow(ReaderOutcome outcome, const std::string& message) const;
+    [[noreturn]] void failWithGarbage(const std::string& why) const;
+
+    const std::string& path_;
+    IsolationLimits given_, usual_, limits_;
+    const Execution& execution_;
+    std::vector<std::byte> report_;
+};
+
+ReportStart IsolatedReading::start() const {
+    ReportStart start;
+    std::memcpy(&start, report_.data(), sizeof start);
+    return start;
+}
+
+void IsolatedReading::failWithGarbage(const std::string& why) const {
+    throw InputError(path_ + ": the reader went wrong and handed over no sound mesh (" + why +
+                     "); the file is damaged, or hits a bug of the library that reads it");
+}
+
+bool IsolatedReading::isComplete() const {
+    if (report_.size() < sizeof(ReportStart)) return false;
+    const ReportStart s = start();
+    const std::uint64_t most =
+        s.outcome == ReaderOutcome::meshFollows ? std::uint64_t(limits_.memoryBytes) : kLongestMessage;
+    if (s.magic != ReportStart::kMagic || s.outcome > ReaderOutcome::outOfMemory || s.bytes > most ||
+        report_.size() - sizeof s > s.bytes)
+        failWithGarbage("its report makes no sense");
+    return report_.size() - sizeof s == s.bytes;
+}
+
+/// Takes what there is in the pipe. False when the child has closed it.
+bool IsolatedReading::receive(int descriptor) {
+    std::array<std::byte, 1 << 16> buffer;
+    while (!isComplete()) {
+        const ssize_t count = ::read(descriptor, buffer.data(), buffer.size());
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0) return true;
+        if (count == 0) return false;
+        report_.insert(report_.end(), buffer.begin(), buffer.begin() + count);
+    }
+    return true;
+}
+
+void IsolatedReading::awaitReport(ReaderProcess& process) {
+    double spentMs = 0;
+    Timer timer;
+    while (true) {
+        execution_.throwIfCancelled();
+        const bool open = receive(process.reports());
+        if (isComplete()) return;
+        if (!open)
+            throw InputError(path_ + ": the reader " + process.describeEnd() +
+                             "; the file is damaged, or hits a bug of the library that reads it");
+        // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the reader's.
+        spentMs += std::min(timer.restart(), 5.0 * kTickMs);
+        const double leftMs = limits_.seconds * 1e3 - spentMs;
+        if (leftMs <= 0)
+            throw InputError(
+                path_ + ": reading it took more than " + inSeconds(limits_.seconds) +
+                (given_.seconds > 0
+                     ? ", the limit given; for a file like this it would be " + inSeconds(usual_.seconds)
+                     : ", the limit for a file like this; --max-read-time sets another"));
+        pollfd reports{process.reports(), POLLIN, 0};
+        ::poll(&reports, 1, int(std::ceil(std::min(leftMs, double(kTickMs)))));
+    }
+}
+
+void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message) const {
+    switch (outcome) {
+        case ReaderOutcome::inputError:
+            throw InputError(message);
+        case ReaderOutcome::ioError:
+            throw IoError(message);
+        case ReaderOutcome::internalError:
+            throw InternalError(message);
+        case ReaderOutcome::overLimit:
+            throw InputError(
+                path_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
+                (given_.memoryBytes > 0
+                     ? "the limit given; for a file like this it would be " + inMiB(usual_.memoryBytes)
+                     : "the limit for a file like this; --max-memory sets another"));
+        case ReaderOutcome::outOfMemory:
+            throw std::bad_alloc();
+        default:
+            throw std::runtime_error(message);
+    }
+}
+
+std::unique_ptr<ReaderProcess> IsolatedReading::startProcess(const IsolatedReader& reader,
+                                                             const ReadOptions& options) const {
+    const std::vector<std::string> request =
+        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
+    if (reader.threadsAtStart > 0 && threadCount() == reader.threadsAtStart)
+        return std::make_unique<ReaderProcess>([&] { return serveMeshReader(request); });
+    std::vector<std::string> words = reader.arguments;
+    words.insert(words.end(), request.begin(), request.end());
+    return std::make_unique<ReaderProcess>(reader.executable, words);
+}
+
+MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
+    const std::unique_ptr<ReaderProcess> process = startProcess(reader, options);
+    awaitReport(*process);
+    const ReportStart s = start();
+    const std::span<const std::byte> rest = std::span(report_).subspan(sizeof s);
+    try {
+        if (s.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
+        if (s.outcome == ReaderOutcome::meshInMemory)
+            return readPacket(SealedMemory(process->mesh()).bytes(), execution_);
+    } catch (const DamagedPacket& damage) {
+        failWithGarbage(damage.what());
+    }
+    rethrow(s.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
+}
+
+}  // namespace
+
+int threadCount() {
+    std::error_code error;
+    const std::filesystem::directory_iterator threads("/proc/self/task", error);
+    return error ? 0 : int(std::distance(begin(threads), end(threads)));
+}
+
+MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
+                          const IsolationLimits& limits, const Execution& execution) {
+    execution.throwIfCancelled();
+    return IsolatedReading(path, limits, execution).run(reader, options);
+}
+
+}  // namespace tessera

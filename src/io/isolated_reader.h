@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/read_mesh.h"
+
+namespace tessera {
+
+/// The program that reads in a process of its own: one that calls serveMeshReader with the arguments it finds
+/// behind these.
+struct IsolatedReader {
+    std::string executable;
+    std::vector<std::string> arguments;
+    /// When the program is the one that runs now: threadCount() at the start of its main. As long as there
+    /// are no more, the threads beside this one are sleepers that libraries start as they are loaded, and a
+    /// copy of the process (fork) reads: that spares the tenth of a second that loading the libraries takes.
+    /// 0: always start the program.
+    int threadsAtStart = 0;
+};
+
+/// Threads of this process; 0 where the system doesn't tell.
+int threadCount();
+
+/// Bounds on the reading process. 0 means one from the size of the file, see defaultLimits.
+struct IsolationLimits {
+    std::int64_t memoryBytes = 0;  ///< address space beyond what the program takes when it starts
+    double seconds = 0;            ///< from its start to its last byte
+};
+
+/// Bounds for a mesh of this size on disk, its companion files included: 640 MiB and 96 bytes a byte of file,
+/// at most three quarters of the memory here; 6 s and a second for every 4 MB. Structured grids, which hold
+/// more cells in fewer bytes, and files above 8 MB get more by the number of cells that they declare. Checks
+/// what a VTK XML file declares. Throws InputError when the file is missing, empty or damaged at first sight.
+IsolationLimits defaultLimits(const std::string& path);
+
+/// readMesh in a process of its own, which takes crashes, endless loops and endless demands for memory with
+/// it: they become an InputError that names the file and what happened. Errors, warnings and the mesh are
+/// those of readMesh, bit for bit. The mesh comes back through memory that both share, and is checked. Throws
+/// IoError when the process can't be started, std::bad_alloc when this one's own address space is too small.
+MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
+                          const IsolationLimits& limits, const Execution& execution);
+
+using MeshReader =
+    std::function<MeshFile(const std::string& path, const ReadOptions& options, const Execution& execution)>;
+
+/// The other side, to be called before anything else in the program that readMeshIsolated starts: bounds this
+/// process, reads and reports. Returns the exit code; leave with it by _exit, as libraries have nothing to
+/// tidy up. Throws InputError when it wasn't started by readMeshIsolated.
+/// @param arguments those behind IsolatedReader::arguments.
+int serveMeshReader(std::span<const std::string> arguments, const MeshReader& read = readMesh);
+
+}  // namespace tessera

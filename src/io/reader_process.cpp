@@ -1,0 +1,213 @@
+#include "io/reader_process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "base/error.h"
+#include "io/mesh_packet.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kFirstSpare = 10;  // above every descriptor that the child gets
+constexpr int kEndMs = 2000;
+constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
+
+[[noreturn]] void failToStart(const std::string& what, int error) {
+    throw IoError("can't start the process that reads meshes: " + what + ": " + std::strerror(error));
+}
+
+/// A copy that no dup2 in the child overwrites.
+Descriptor spareCopy(const Descriptor& descriptor) {
+    const int copy = ::fcntl(descriptor.get(), F_DUPFD_CLOEXEC, kFirstSpare);
+    if (copy < 0) failToStart("descriptor", errno);
+    return Descriptor(copy);
+}
+
+/// The terminal signals the whole group: what becomes of the child is its parent's decision.
+sigset_t maskOfChild() {
+    sigset_t blocked;
+    pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) sigaddset(&blocked, number);
+    return blocked;
+}
+
+/// What posix_spawn does in the child.
+class SpawnPlan {
+  public:
+    SpawnPlan(const Descriptor& reports, const Descriptor& mesh) {
+        posix_spawn_file_actions_init(&actions_);
+        posix_spawnattr_init(&attributes_);
+        int error = 0;
+        for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+            error |= posix_spawn_file_actions_addopen(&actions_, stream, "/dev/null", O_RDWR, 0);
+        error |= posix_spawn_file_actions_adddup2(&actions_, reports.get(), kReportDescriptor);
+        error |= posix_spawn_file_actions_adddup2(&actions_, mesh.get(), kMeshDescriptor);
+        error |= posix_spawn_file_actions_addclosefrom_np(&actions_, kMeshDescriptor + 1);
+        const sigset_t blocked = maskOfChild();
+        error |= posix_spawnattr_setsigmask(&attributes_, &blocked);
+        error |= posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
+        if (error != 0) {
+            release();
+            failToStart("preparation", ENOMEM);
+        }
+    }
+    ~SpawnPlan() { release(); }
+    SpawnPlan(const SpawnPlan&) = delete;
+    SpawnPlan& operator=(const SpawnPlan&) = delete;
+
+    pid_t spawn(const std::string& executable, const std::vector<std::string>& arguments) {
+        std::vector<char*> words{const_cast<char*>(executable.c_str())};
+        for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+        words.push_back(nullptr);
+        pid_t child = -1;
+        if (const int error =
+                posix_spawn(&child, executable.c_str(), &actions_, &attributes_, words.data(), environ))
+            failToStart(executable, error);
+        return child;
+    }
+
+  private:
+    void release() {
+        posix_spawn_file_actions_destroy(&actions_);
+        posix_spawnattr_destroy(&attributes_);
+    }
+    posix_spawn_file_actions_t actions_;
+    posix_spawnattr_t attributes_;
+};
+
+/// Leaves a copy of this process with the descriptors of a started program.
+void takeDescriptors(const Descriptor& reports, const Descriptor& mesh) {
+    const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+    bool done = nowhere >= 0;
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        done = done && ::dup2(nowhere, stream) == stream;
+    done = done && ::dup2(reports.get(), kReportDescriptor) == kReportDescriptor &&
+           ::dup2(mesh.get(), kMeshDescriptor) == kMeshDescriptor &&
+           ::close_range(kMeshDescriptor + 1, ~0U, 0) == 0;
+    if (!done) ::_exit(EXIT_FAILURE);
+}
+
+std::string describe(int status) {
+    if (WIFEXITED(status))
+        return "ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")";
+    const int number = WTERMSIG(status);
+    if (number == SIGKILL) return "was killed (signal 9), as the system does when memory runs out";
+    const char* name = sigdescr_np(number);
+    return "crashed (signal " + std::to_string(number) + (name ? std::string(", ") + name : "") + ")";
+}
+
+}  // namespace
+
+Descriptor& Descriptor::operator=(Descriptor&& other) noexcept {
+    close();
+    number_ = std::exchange(other.number_, -1);
+    return *this;
+}
+
+void Descriptor::close() {
+    if (number_ >= 0) ::close(number_);
+    number_ = -1;
+}
+
+SealedMemory::SealedMemory(int descriptor) {
+    ::fcntl(descriptor, F_ADD_SEALS, kSeals);
+    const int seals = ::fcntl(descriptor, F_GET_SEALS);
+    struct stat status {};
+    if (seals < 0 || (seals & kSeals) != kSeals || ::fstat(descriptor, &status) != 0)
+        throw DamagedPacket("its memory can't be sealed");
+    if (status.st_size == 0) return;
+    const auto size = std::size_t(status.st_size);
+    void* memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, descriptor, 0);
+    if (memory == MAP_FAILED) throw std::bad_alloc();
+    bytes_ = {static_cast<const std::byte*>(memory), size};
+}
+
+SealedMemory::~SealedMemory() {
+    if (!bytes_.empty()) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
+}
+
+void ReaderProcess::open() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) failToStart("pipe", errno);
+    reports_ = Descriptor(ends[0]);
+    childReports_ = Descriptor(ends[1]);
+    if (::fcntl(reports_.get(), F_SETFL, O_NONBLOCK) != 0) failToStart("pipe", errno);
+    mesh_ = Descriptor(::memfd_create("tessera-mesh", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    if (mesh_.get() < 0) failToStart("shared memory", errno);
+    childReports_ = spareCopy(childReports_);
+    childMesh_ = spareCopy(mesh_);
+}
+
+ReaderProcess::ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments) {
+    open();
+    child_ = SpawnPlan(childReports_, childMesh_).spawn(executable, arguments);
+    childReports_.close();
+    childMesh_.close();
+}
+
+ReaderProcess::ReaderProcess(const std::function<int()>& work) {
+    open();
+    const sigset_t blocked = maskOfChild();
+    sigset_t before;
+    pthread_sigmask(SIG_SETMASK, &blocked, &before);
+    child_ = ::fork();
+    if (child_ == 0) {
+        takeDescriptors(childReports_, childMesh_);
+        int code = EXIT_FAILURE;
+        try {
+            code = work();
+        } catch (...) {  // nobody is left to tell
+        }
+        ::_exit(code);
+    }
+    const int error = errno;
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    childReports_.close();
+    childMesh_.close();
+    if (child_ < 0) failToStart("fork", error);
+}
+
+ReaderProcess::~ReaderProcess() {
+    kill();
+}
+
+void ReaderProcess::kill() {
+    if (child_ < 0) return;
+    ::kill(child_, SIGKILL);
+    while (::waitpid(child_, nullptr, 0) < 0 && errno == EINTR) continue;
+    child_ = -1;
+}
+
+std::string ReaderProcess::describeEnd() {
+    // A process closes its files a moment before it can be reaped.
+    for (int wait = 0; child_ >= 0 && wait < kEndMs; ++wait) {
+        int status = 0;
+        const pid_t reaped = ::waitpid(child_, &status, WNOHANG);
+        if (reaped < 0 && errno != EINTR) break;  // where SIGCHLD is ignored there is nothing to reap
+        if (reaped > 0) {
+            child_ = -1;
+            return describe(status);
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    kill();
+    return "ended without a result";
+}
+
+}  // namespace tessera

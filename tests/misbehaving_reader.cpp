@@ -1,0 +1,133 @@
+// The reading process of isolated_reader_test: its first word says how it goes wrong, the rest is what
+// readMeshIsolated gives it.
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "io/isolated_reader.h"
+#include "io/reader_process.h"
+#include "io/reader_report.h"
+
+namespace {
+
+using tessera::kMeshDescriptor;
+using tessera::kReportDescriptor;
+using tessera::ReaderOutcome;
+using tessera::ReportStart;
+
+void put(int descriptor, const void* bytes, std::size_t count) {
+    if (write(descriptor, bytes, count) != ssize_t(count)) _exit(99);
+}
+
+void claimMesh() {
+    const ReportStart start{ReportStart::kMagic, ReaderOutcome::meshInMemory, 0};
+    put(kReportDescriptor, &start, sizeof start);
+}
+
+[[noreturn]] void allocateForEver() {
+    std::vector<std::unique_ptr<char[]>> blocks;
+    while (true) {
+        blocks.push_back(std::make_unique<char[]>(1 << 20));
+        std::memset(blocks.back().get(), 1, 1 << 20);
+    }
+}
+
+/// Descriptors that are open beside the five a reader has.
+std::string otherDescriptors() {
+    std::string list;
+    for (int d = kMeshDescriptor + 1; d < 1024; ++d)
+        if (fcntl(d, F_GETFD) >= 0) list += std::to_string(d) + " ";
+    return list;
+}
+
+/// What happens in place of readMesh, by name.
+const std::map<std::string, std::function<tessera::MeshFile(const std::string& path)>> kReaders{
+    {"crash",
+     [](const std::string&) -> tessera::MeshFile {
+         raise(SIGSEGV);
+         return {};
+     }},
+    {"abort", [](const std::string&) -> tessera::MeshFile { std::abort(); }},
+    {"exit", [](const std::string&) -> tessera::MeshFile { _exit(7); }},
+    {"hang",
+     [](const std::string& path) -> tessera::MeshFile {
+         std::ofstream(path + ".pid") << getpid() << std::endl;
+         while (true) pause();
+     }},
+    {"allocate", [](const std::string&) -> tessera::MeshFile { allocateForEver(); }},
+    {"throw-input",
+     [](const std::string& path) -> tessera::MeshFile { throw tessera::InputError(path + ": so"); }},
+    {"throw-io", [](const std::string&) -> tessera::MeshFile { throw tessera::IoError("disk gone"); }},
+    {"throw-internal",
+     [](const std::string&) -> tessera::MeshFile { throw tessera::InternalError("a bug"); }},
+    {"throw-other", [](const std::string&) -> tessera::MeshFile { throw std::runtime_error("odd"); }},
+    {"throw-number", [](const std::string&) -> tessera::MeshFile { throw 1; }},
+    {"print",
+     [](const std::string&) -> tessera::MeshFile {
+         std::puts("to standard output");
+         std::fputs("to standard error\n", stderr);
+         throw tessera::InputError("printed");
+     }},
+    {"descriptors",
+     [](const std::string&) -> tessera::MeshFile {
+         throw tessera::InputError("open: " + otherDescriptors());
+     }},
+};
+
+/// What happens instead of serving at all, by name.
+const std::map<std::string, std::function<void()>> kImpostors{
+    {"silent", [] { _exit(0); }},
+    {"noise", [] { put(kReportDescriptor, "this is not a report, is it?", 28); }},
+    {"half-report", [] { put(kReportDescriptor, "Tss", 3); }},
+    {"endless-message",
+     [] {
+         const ReportStart start{ReportStart::kMagic, ReaderOutcome::inputError, std::uint64_t(1) << 60};
+         put(kReportDescriptor, &start, sizeof start);
+         pause();
+     }},
+    {"no-mesh", [] { claimMesh(); }},
+    {"noise-as-mesh",
+     [] {
+         const std::vector<char> noise(4096, '\x5a');
+         put(kMeshDescriptor, noise.data(), noise.size());
+         claimMesh();
+     }},
+    {"writable-mesh",
+     [] {
+         if (ftruncate(kMeshDescriptor, 4096) != 0) _exit(98);
+         if (mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, kMeshDescriptor, 0) == MAP_FAILED)
+             _exit(97);
+         claimMesh();
+         pause();
+     }},
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    if (argc < 2) return 96;
+    const std::string mode = argv[1];
+    if (const auto impostor = kImpostors.find(mode); impostor != kImpostors.end()) {
+        impostor->second();
+        _exit(0);
+    }
+    const std::vector<std::string> words(argv + 2, argv + argc);
+    if (mode == "read") _exit(tessera::serveMeshReader(words));
+    const auto reader = kReaders.find(mode);
+    if (reader == kReaders.end()) return 95;
+    _exit(tessera::serveMeshReader(words, [&](const std::string& path, const tessera::ReadOptions&,
+                                              const tessera::Execution&) { return reader->second(path); }));
+}
