@@ -298,6 +298,24 @@ TEST_F(VdbFileTest, VoxelsFromSmallToLargeCanBeWritten) {
     }
 }
 
+TEST_F(VdbFileTest, SpacingIsExactFarFromTheOrigin) {
+    for (double far : {1e6, 1e12, 1e15, -1e17}) {
+        SCOPED_TRACE(far);
+        const Vec3d origin(far, 1 - far, 0);
+        BrickResult result = makeResult(origin, 0.05, 8, {{0, {0, 0, 0}}}, 1);
+        writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+        const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f_level_0");
+        EXPECT_EQ(grid->voxelSize(), openvdb::Vec3d(0.05));
+        EXPECT_EQ(grid->indexToWorld(openvdb::Coord(0)), openvdb::Vec3d(origin.x, origin.y, origin.z));
+    }
+}
+
+TEST_F(VdbFileTest, VoxelsTooSmallForAnyUnitAreRefused) {
+    BrickResult result = makeResult({0, 0, 0}, 5e-322, 8, {}, 1);
+    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {}), InputError);
+    EXPECT_EQ(fileCount(), 0u);
+}
+
 TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
     for (UpAxis axis : {UpAxis::y, UpAxis::z}) {
         BrickResult result = makeResult({1, 2, 3}, 0.5, 8, nestedLeaves(), 10);

@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "output_paths.h"
+#include "report_text.h"
 
 namespace {
 
@@ -18,11 +19,7 @@ constexpr int kExitBadInput = 2;
 
 /// One line on standard error, whatever the message holds.
 void printError(const char* message) {
-    std::string line(message);
-    for (char& c : line)
-        if (c == '\n' || c == '\r') c = ' ';
-    while (!line.empty() && line.back() == ' ') line.pop_back();
-    fmt::print(stderr, "tessera: {}\n", line);
+    fmt::print(stderr, "tessera: {}\n", tessera::singleLine(message));
 }
 
 struct Arguments {

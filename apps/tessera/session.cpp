@@ -3,6 +3,7 @@
 
 #include "commands.h"
 #include "interrupt.h"
+#include "report_text.h"
 
 namespace tessera {
 
@@ -16,13 +17,13 @@ Session::Session(const CommonOptions& options)
 void Session::print(const std::string& text) {
     progress.clear();
     if (!prints_) return;
-    std::fputs(text.c_str(), stdout);
+    std::fputs(withoutControls(text).c_str(), stdout);
     std::fflush(stdout);
 }
 
 void Session::warn(const std::string& text) {
     progress.clear();
-    const std::string line = "tessera: warning: " + text + "\n";
+    const std::string line = "tessera: warning: " + singleLine(text) + "\n";
     std::fputs(line.c_str(), stderr);
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "io/json_integer.h"
 #include "io/report_json.h"
 
 namespace tessera {
@@ -80,7 +81,7 @@ BrickTree decodeTree(const std::string& text) {
     Vec3d origin;
     for (int axis = 0; axis < 3; ++axis) origin[axis] = json.at("origin").at(std::size_t(axis)).get<double>();
     const double spacing = json.at("spacing").get<double>();
-    const int brickCells = json.at("brick_cells").get<int>();
+    const int brickCells = readInteger<int>(json.at("brick_cells"), "brick_cells");
     if (!(spacing > 0) || !std::isfinite(spacing)) damaged("the spacing of the bricks isn't positive");
     if (brickCells != 8 && brickCells != 16 && brickCells != 32 && brickCells != 64)
         damaged("bricks of " + std::to_string(brickCells) + " cells");
@@ -96,7 +97,8 @@ BrickTree decodeTree(const std::string& text) {
             BrickKey key;
             key.level = int(level);
             for (int axis = 0; axis < 3; ++axis) {
-                const std::int64_t index = list[i + std::size_t(axis)].get<std::int64_t>();
+                const std::int64_t index =
+                    readInteger<std::int64_t>(list[i + std::size_t(axis)], "a brick index");
                 if (index < -limit || index >= limit)
                     damaged("brick index " + std::to_string(index) + " out of range");
                 key.index[axis] = int(index);
@@ -151,8 +153,8 @@ std::vector<OutputField> decodeFields(const std::string& text) {
         entry.at("name").get_to(field.name);
         entry.at("source").get_to(field.sourceName);
         entry.at("location").get_to(field.location);
-        entry.at("components").get_to(field.components);
-        entry.at("first_channel").get_to(field.firstChannel);
+        field.components = readInteger<int>(entry.at("components"), "components");
+        field.firstChannel = readInteger<int>(entry.at("first_channel"), "first_channel");
         if (field.components < 1 || field.components > 64)
             damaged("a field of " + std::to_string(field.components) + " components");
         if (field.firstChannel != channels) damaged("the fields' channels don't follow each other");
@@ -215,6 +217,9 @@ double chooseUnitScale(double finestSpacingWorld, double requested) {
     if (finestSpacingWorld >= kComfortableFileSpacing) return scale;
     for (int power = 1; power <= 300 && finestSpacingWorld * scale < 1e-3; ++power)
         scale = readDouble("1e" + std::to_string(power), "power of ten");
+    if (!(finestSpacingWorld * scale >= kSmallestFileSpacing))
+        throw InputError("the finest voxel is " + exactText(finestSpacingWorld) +
+                         " units: too small for OpenVDB in any unit");
     return scale;
 }
 

@@ -49,9 +49,11 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
     const Vec3d origin = tree.originWorld() * unitScale;
     const double spacing = tree.spacingWorld(level) * unitScale;
     if (upAxis == UpAxis::keep) {
-        const math::MapBase::Ptr map(
-            new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
-        return math::Transform::Ptr(new math::Transform(map));
+        // Made in two steps: from a map of both, OpenVDB takes the spacing as a difference of places, which
+        // far from the origin is rounded, or 0.
+        const math::Transform::Ptr transform = math::Transform::createLinearTransform(spacing);
+        transform->postTranslate({origin.x, origin.y, origin.z});
+        return transform;
     }
     // Rows: where an index step along x, y, z leads in the file, then the place of index (0, 0, 0).
     const auto rows = [&](double yz, double zy, double y, double z) {
