@@ -124,7 +124,7 @@ class KillTest:
         command = rng.choice(self.commands)
         number = rng.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
         while_writing, with_old = rng.random() < 0.4, rng.random() < 0.5
-        delay = rng.uniform(0, 0.03) if while_writing else rng.uniform(0, 1.05 * command.seconds)
+        delay = rng.uniform(0, 0.03) if while_writing else rng.uniform(0, 0.9 * command.seconds)
         context = f"run {index} ({command.name}, {number.name}{', writing' if while_writing else ''}, {delay:.3f} s{', older file' if with_old else ''})"
         place = self.folder / "run"
         shutil.rmtree(place, ignore_errors=True)

@@ -54,6 +54,7 @@ TEST(VdbMetadata, NumbersThatDoNotFitAreRefused) {
         expectRefused(bricks, "[[2,", std::string("[[") + number + ",", "a brick index");
     expectRefused(bricks, "[[2,", "[[67108864,", "67108864");
     expectRefused(bricks, "[[2,", "[[18446744073709551615,", "a brick index");
+    expectRefused(bricks, "\"spacing\":0.25", "\"spacing\":1e308", "coarsest level");
     expectRefused(bricks, "\"brick_cells\":16", "\"brick_cells\":4294967312", "brick_cells");
     // 2^32 + 3 would wrap to 3.
     expectRefused("tessera_fields", "\"components\":3", "\"components\":4294967299", "components");
@@ -67,8 +68,8 @@ TEST(VdbMetadata, DeepNestingIsRefused) {
     const std::string deep(200000, '['), end(200000, ']');
     EXPECT_THROW(reportFromJson(deep), InputError);
     EXPECT_THROW(reportFromJson(deep + end), InputError);
-    expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":" + deep + end, "nodes");
-    expectRefused("tessera_bricks", "[[2,", "[[" + deep + end + ",", "a brick index");
+    expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":" + deep + end, "nested");
+    expectRefused("tessera_bricks", "[[2,", "[[" + deep + end + ",", "nested");
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
-#include "io/json_integer.h"
+#include "io/json_parse.h"
 
 namespace tessera {
 namespace {
@@ -99,7 +99,7 @@ std::string reportToJson(const ErrorReport& report) {
 
 ErrorReport reportFromJson(const std::string& text) {
     try {
-        const Json json = Json::parse(text);
+        const Json json = parseJson<Json>(text);
         ErrorReport report;
         for (const Json& field : json.at("fields")) report.fields.push_back(fieldFromJson(field));
         report.fullyCoveredShare = readNumber(json.at("fully_covered_share"));

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "io/json_integer.h"
+#include "io/json_parse.h"
 #include "io/report_json.h"
 
 namespace tessera {
@@ -77,7 +77,7 @@ std::string encodeTree(const BrickTree& tree) {
 }
 
 BrickTree decodeTree(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     Vec3d origin;
     for (int axis = 0; axis < 3; ++axis) origin[axis] = json.at("origin").at(std::size_t(axis)).get<double>();
     const double spacing = json.at("spacing").get<double>();
@@ -87,6 +87,8 @@ BrickTree decodeTree(const std::string& text) {
         damaged("bricks of " + std::to_string(brickCells) + " cells");
     const Json& levels = json.at("levels");
     if (levels.size() > kMaxLevels) damaged(std::to_string(levels.size()) + " levels");
+    if (!std::isfinite(std::ldexp(spacing, int(levels.size()))))
+        damaged("the spacing of the coarsest level isn't finite");
     std::vector<BrickKey> leaves;
     for (std::size_t level = 0; level < levels.size(); ++level) {
         const Json& list = levels[level];
@@ -118,7 +120,7 @@ std::string encodeBounds(const Box3d& box) {
 }
 
 Box3d decodeBounds(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     if (json.size() != 6) damaged("tessera_bounds isn't six numbers");
     Box3d box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -145,7 +147,7 @@ std::string encodeFields(const std::vector<OutputField>& fields) {
 }
 
 std::vector<OutputField> decodeFields(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     std::vector<OutputField> fields;
     int channels = 0;
     for (const Json& entry : json) {

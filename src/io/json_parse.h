@@ -10,6 +10,17 @@
 
 namespace tessera {
 
+/// Parses JSON that is nested no deeper than ours: the library copies what it has read in recursion, so a
+/// deep text would end the process. Throws InputError, and Json::exception for what isn't JSON.
+template <class Json>
+Json parseJson(const std::string& text) {
+    constexpr int kDeepest = 32;
+    return Json::parse(text, [](int depth, typename Json::parse_event_t, Json&) {
+        if (depth > kDeepest) throw InputError("damaged: JSON nested more than 32 deep");
+        return true;
+    });
+}
+
 /// A whole number that fits the type. The library's own conversion wraps what is too large and cuts off a
 /// fraction. Throws InputError, which calls the number `name`, for these and for anything that isn't a
 /// number.
