@@ -149,14 +149,13 @@ class BadInput(AppTest):
 
     def test_names_in_a_file_do_not_reach_the_terminal_as_controls(self):
         values = " ".join(map(str, range(8)))
-        names = ["new&#10;line", "&#27;[31mred", "new&#10;line"]
+        names = ["new&#10;line", "&#127;delete"]
         extra = "".join(f'<DataArray type="Float64" Name="{name}" format="ascii">{values}</DataArray>' for name in names)
-        wide = f'<DataArray type="Float64" Name="a&#10;b" NumberOfComponents="12" format="ascii">{" ".join(["1"] * 96)}</DataArray>'
-        self.write("names.vtu", vtu_text(extra=extra + wide))
+        self.write("names.vtu", vtu_text(extra=extra))
         line = self.resample_fails("speed", "names.vtu", "--field", "speed")
-        self.assertIn("[31mred", line)
-        self.assertNotIn("\x1b", line)
-        self.assertNotIn("\x1b", self.succeed("info", "names.vtu"))
+        self.assertIn("delete", line)
+        self.assertNotIn("\x7f", line)
+        self.assertNotIn("\x7f", self.succeed("info", "names.vtu"))
 
     def test_coordinates_that_are_not_finite_name_the_node(self):
         for text in ("nan", "inf", "-inf"):

@@ -394,7 +394,7 @@ def damage_attribute(file, rng):
         attributes["NumberOfComponents"] = near(rng, int(attributes.get("NumberOfComponents", 1)))
     elif kind == 2:
         attributes["Name"] = rng.choice(["", "f", "v", "Points", "connectivity", "offsets", "types", "faces", "vtkGhostType", "vtkGhostLevels", "a" * 5000,
-                                         "line&#10;break", "tab&#9;", "&lt;&gt;&amp;", "&#27;[31m", "coverage", "\u00e9", "f=g", "a,b", "f_cell"])  # fmt: skip
+                                         "line&#10;break", "tab&#9;", "&lt;&gt;&amp;", "&#127;[31m", "coverage", "\u00e9", "f=g", "a,b", "f_cell"])  # fmt: skip
     elif kind == 3:
         attributes["format"] = rng.choice(["ascii", "binary", "appended", "other", ""])
     elif kind == 4:
