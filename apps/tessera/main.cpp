@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
     try {
         return run(app, arguments);
     } catch (const tessera::Cancelled&) {
-        printError("interrupted; nothing was written");
+        printError("interrupted; no unfinished file is left");
         return 128 + tessera::interruptSignal();
     } catch (const tessera::InputError& error) {
         printError(error.what());
