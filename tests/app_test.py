@@ -147,6 +147,16 @@ class BadInput(AppTest):
             self.write("index.vtu", vtu_text(cells=[(0, 1, 3, bad)]))
             self.resample_fails("index.vtu", "index.vtu")
 
+    def test_names_in_a_file_do_not_reach_the_terminal_as_controls(self):
+        values = " ".join(map(str, range(8)))
+        names = ["new&#10;line", "&#127;delete"]
+        extra = "".join(f'<DataArray type="Float64" Name="{name}" format="ascii">{values}</DataArray>' for name in names)
+        self.write("names.vtu", vtu_text(extra=extra))
+        line = self.resample_fails("speed", "names.vtu", "--field", "speed")
+        self.assertIn("delete", line)
+        self.assertNotIn("\x7f", line)
+        self.assertNotIn("\x7f", self.succeed("info", "names.vtu"))
+
     def test_coordinates_that_are_not_finite_name_the_node(self):
         for text in ("nan", "inf", "-inf"):
             points = [list(p) for p in CUBE_POINTS]

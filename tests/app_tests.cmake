@@ -7,6 +7,14 @@ if(TARGET tessera)
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
   endforeach()
+  # Short runs; docs/testing.md tells of the long ones.
+  add_test(NAME mutated_meshes
+    COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera> --count 60 --seed 1
+            --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutants)
+  add_test(NAME kill_test
+    COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
+            --count 20 --seed 1)
+  set_tests_properties(mutated_meshes kill_test PROPERTIES PROCESSORS 2)
   if(NOT TESSERA_SANITIZE)
     add_test(NAME external_check_against_vtk
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/external/check_against_vtk.py --tessera $<TARGET_FILE:tessera>

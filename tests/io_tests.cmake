@@ -5,6 +5,12 @@ if(TESSERA_BUILD_IO)
       set_source_files_properties(${name}.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=undefined)  # as in src/io
     endif()
   endforeach()
+  tessera_test(vdb_metadata_test LINK io)
+  # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
+  foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh)
+    tessera_program(replay_${name} SOURCES fuzz/replay.cpp fuzz/${name}.cpp LINK io)
+    add_test(NAME replay_${name} COMMAND replay_${name} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${name})
+  endforeach()
   tessera_test(image_test LINK io PRIVATE_LINK PNG::PNG)
   tessera_test(image_exr_test LINK io registry reference PRIVATE_LINK PkgConfig::OPENEXR)
 endif()

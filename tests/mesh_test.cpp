@@ -215,6 +215,17 @@ TEST(MeshQuality, FindsHangingNodesAndStackedFaces) {
     EXPECT_EQ(measureQuality(stacked, {}).coincidentNodes, 3);
 }
 
+TEST(MeshQuality, MeasuresMeshesAtTheEndOfTheRangeOfDouble) {
+    // The box of a face and its margin are infinite.
+    constexpr double kLargest = std::numeric_limits<double>::max();
+    TetMesh mesh;
+    mesh.points = {{kLargest, 0, 0}, {-kLargest, 0, 0}, {0, kLargest, 0}, {0, 0, -kLargest}, {0, 0, 5e-324}};
+    mesh.tets = {{0, 1, 2, 3}, {0, 1, 2, 4}};
+    const MeshQuality quality = measureQuality(mesh, {});
+    EXPECT_EQ(quality.flat, 0);
+    EXPECT_EQ(quality.boundaryFaces, 6);
+}
+
 TEST(MeshQuality, FirstNodeAtPlaceIsTheLowestIndex) {
     Random random(6);
     std::vector<Vec3d> points;

@@ -305,6 +305,45 @@ TEST(SplitCells, SurvivesCollapsedCells) {
     EXPECT_EQ(sumOfVolumes(split(onePlace, point)), 0);
 }
 
+TEST(SplitCells, KeepsAddedNodesFiniteAtTheEndOfTheRangeOfDouble) {
+    constexpr double kLargest = std::numeric_limits<double>::max();
+    for (const double length : {1.0, 1e200, kLargest}) {
+        Grid grid(1, 0, 1);
+        for (Vec3d& point : grid.points) point = length * (2.0 * point - 1.0);
+        CellList cells;
+        addPolyhedron(cells, hexFaces(grid.hex(0, 0, 0)));
+        // Folded over, so that no node sees the whole cell.
+        const auto h = grid.hex(0, 0, 0);
+        const std::int32_t folded[] = {h[6], h[1], h[2], h[3], h[4], h[5], h[0], h[7]};
+        cells.add(CellKind::hex, folded, 8);
+        for (const AddedNode& node : splitCells(grid.points, cells, {}).addedNodes) {
+            EXPECT_TRUE(std::isfinite(node.point.x + node.point.y + node.point.z)) << length;
+            for (int k = 0; k < 3; ++k) EXPECT_LE(std::fabs(node.point[k]), length);
+        }
+    }
+}
+
+TEST(SplitCells, TakesCellsWithVeryManyNodesAndFaces) {
+    // A prism over a regular polygon, and a cell that has one face over and over.
+    constexpr int kSides = 30000;
+    std::vector<Vec3d> points;
+    std::vector<std::vector<std::int32_t>> faces(2);
+    for (int i = 0; i < kSides; ++i) {
+        const double angle = 2 * M_PI * i / kSides;
+        for (int z = 0; z < 2; ++z) points.push_back({std::cos(angle), std::sin(angle), z});
+        const int j = (i + 1) % kSides;
+        faces[0].push_back(2 * (kSides - 1 - i));
+        faces[1].push_back(2 * i + 1);
+        faces.push_back({2 * i, 2 * j, 2 * j + 1, 2 * i + 1});
+    }
+    CellList prism;
+    addPolyhedron(prism, faces);
+    EXPECT_NEAR(sumOfVolumes(split(points, prism)), kSides / 2.0 * std::sin(2 * M_PI / kSides), 1e-9);
+    CellList repeated;
+    addPolyhedron(repeated, std::vector<std::vector<std::int32_t>>(std::size_t(kSides), {0, 2, 1}));
+    EXPECT_EQ(sumOfVolumes(split(points, repeated)), 0);
+}
+
 TEST(SplitCells, GivesTheSameForEveryNumberOfThreads) {
     const Grid grid(20, 0.4, 9);  // so shaken that many cells need a centre
     CellList cells;

@@ -298,6 +298,30 @@ TEST_F(VdbFileTest, VoxelsFromSmallToLargeCanBeWritten) {
     }
 }
 
+TEST_F(VdbFileTest, SaysWhatDistanceFromTheOriginCosts) {
+    const auto write = [&](double far) {
+        BrickResult result = makeResult({0, far, 0}, 0.05, 8, {{0, {0, 0, 0}}}, 1);
+        return writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {}).notes;
+    };
+    EXPECT_TRUE(write(1e6).empty());
+    // At 1e14 places are multiples of 2^-6: a voxel of 0.05 becomes one of 3 / 64, off by 1/16 a voxel, 8 of
+    // them by a half.
+    ASSERT_EQ(write(1e14).size(), 1u);
+    EXPECT_NE(write(1e14)[0].find("off by up to 0.5 voxels"), std::string::npos) << write(1e14)[0];
+    EXPECT_EQ(readVdb(file("out.vdb")).tree.spacingWorld(), 0.05);
+    fs::remove(file("out.vdb"));
+    for (double far : {1e15, 1e16, -1e300}) {
+        EXPECT_THROW(write(far), InputError) << far;
+        EXPECT_EQ(fileCount(), 0u);
+    }
+}
+
+TEST_F(VdbFileTest, VoxelsTooSmallForAnyUnitAreRefused) {
+    BrickResult result = makeResult({0, 0, 0}, 5e-322, 8, {}, 1);
+    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {}), InputError);
+    EXPECT_EQ(fileCount(), 0u);
+}
+
 TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
     for (UpAxis axis : {UpAxis::y, UpAxis::z}) {
         BrickResult result = makeResult({1, 2, 3}, 0.5, 8, nestedLeaves(), 10);

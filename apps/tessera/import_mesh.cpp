@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/timer.h"
+#include "io/json_parse.h"
 #include "report_text.h"
 
 namespace tessera {
@@ -230,7 +231,7 @@ std::optional<RepairOptions> decodeRepair(const std::string& text) {
     if (text.empty()) return std::nullopt;
     RepairOptions options;
     try {
-        const Json json = Json::parse(text);
+        const Json json = parseJson<Json>(text);
         json.at("min_aspect").get_to(options.limits.minAspect);
         json.at("max_dihedral_degrees").get_to(options.limits.maxDihedralDegrees);
         json.at("max_volume_loss").get_to(options.maxVolumeLoss);

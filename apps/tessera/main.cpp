@@ -14,6 +14,7 @@
 #include "interrupt.h"
 #include "io/atomic_file.h"
 #include "output_paths.h"
+#include "report_text.h"
 
 namespace {
 
@@ -22,11 +23,7 @@ constexpr int kExitBadInput = 2;
 
 /// One line on standard error, whatever the message holds.
 void printError(const char* message) {
-    std::string line(message);
-    for (char& c : line)
-        if (c == '\n' || c == '\r') c = ' ';
-    while (!line.empty() && line.back() == ' ') line.pop_back();
-    fmt::print(stderr, "tessera: {}\n", line);
+    fmt::print(stderr, "tessera: {}\n", tessera::singleLine(message));
 }
 
 struct Arguments {
@@ -140,7 +137,7 @@ int main(int argc, char** argv) {
     try {
         return run(app, arguments);
     } catch (const tessera::Cancelled&) {
-        printError("interrupted; nothing was written");
+        printError("interrupted; no unfinished file is left");
         return 128 + tessera::interruptSignal();
     } catch (const tessera::InputError& error) {
         printError(error.what());

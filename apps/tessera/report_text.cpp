@@ -50,6 +50,19 @@ std::string formatTable(const std::vector<std::vector<std::string>>& rows) {
     return text;
 }
 
+std::string withoutControls(std::string text) {
+    for (char& c : text)
+        if ((static_cast<unsigned char>(c) < 0x20 && c != '\n') || c == 0x7f) c = ' ';
+    return text;
+}
+
+std::string singleLine(std::string text) {
+    text = withoutControls(std::move(text));
+    std::replace(text.begin(), text.end(), '\n', ' ');
+    text.erase(text.find_last_not_of(' ') + 1);
+    return text;
+}
+
 std::string formatCount(std::int64_t count) {
     const std::string digits = std::to_string(count < 0 ? -count : count);
     std::string text(count < 0 ? 1 : 0, '-');

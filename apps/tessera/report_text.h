@@ -13,6 +13,10 @@ std::string formatTable(const std::vector<std::vector<std::string>>& rows);
 std::string formatCount(std::int64_t count);
 /// Bytes with a unit, e.g. "12.3 MB".
 std::string formatBytes(std::int64_t bytes);
+/// Names in a file may hold what a terminal obeys: control characters become spaces, but for line ends.
+std::string withoutControls(std::string text);
+/// The same with line ends as spaces too, and no space at the end.
+std::string singleLine(std::string text);
 
 std::string importText(const std::string& path, const ImportStatistics& statistics, const Box3d& boundsWorld);
 std::string fieldsText(const std::vector<FieldSummary>& fields);

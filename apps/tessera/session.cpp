@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "report_text.h"
 
 namespace tessera {
 
@@ -46,13 +47,13 @@ int runReadMesh(const std::vector<std::string>& words) {
 void Session::print(const std::string& text) {
     progress.clear();
     if (!prints_) return;
-    std::fputs(text.c_str(), stdout);
+    std::fputs(withoutControls(text).c_str(), stdout);
     std::fflush(stdout);
 }
 
 void Session::warn(const std::string& text) {
     progress.clear();
-    const std::string line = "tessera: warning: " + text + "\n";
+    const std::string line = "tessera: warning: " + singleLine(text) + "\n";
     std::fputs(line.c_str(), stderr);
 }
 

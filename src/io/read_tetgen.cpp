@@ -29,7 +29,8 @@ std::string printable(std::string_view word) {
 /// Numbers of a text file, line by line; '#' starts a comment, empty lines don't count.
 class NumberLines {
   public:
-    explicit NumberLines(const std::string& path) : path_(path), file_(path), rest_(file_.bytes()) {}
+    explicit NumberLines(const NamedText& text)
+        : name_(text.name), bytes_(text.bytes.size()), rest_(text.bytes) {}
 
     /// Moves to the next line with content; throws when there is none.
     void next(const char* expected) {
@@ -42,7 +43,7 @@ class NumberLines {
             skipSpaces();
             if (!line_.empty()) return;
         }
-        throw InputError(path_ + ": ends after line " + std::to_string(lineNumber_) + ", expected " +
+        throw InputError(name_ + ": ends after line " + std::to_string(lineNumber_) + ", expected " +
                          expected);
     }
 
@@ -69,16 +70,16 @@ class NumberLines {
     }
 
     [[noreturn]] void fail(const std::string& why) const {
-        throw InputError(path_ + ": line " + std::to_string(lineNumber_) + ": " + why);
+        throw InputError(name_ + ": line " + std::to_string(lineNumber_) + ": " + why);
     }
 
-    std::size_t bytes() const { return file_.bytes().size(); }
+    std::size_t bytes() const { return bytes_; }
 
   private:
     void skipSpaces() { line_.remove_prefix(std::min(line_.find_first_not_of(" \t\r,"), line_.size())); }
 
-    std::string path_;
-    MappedFile file_;
+    std::string name_;
+    std::size_t bytes_;
     std::string_view rest_;
     std::string_view line_;
     std::int64_t lineNumber_ = 0;
@@ -94,8 +95,8 @@ std::int64_t readCount(NumberLines& lines, const char* what, double lineBytes) {
 }
 
 /// Reads the nodes; returns the index of the first.
-std::int64_t readNodes(const std::string& path, RawBlock& block) {
-    NumberLines lines(path);
+std::int64_t readNodes(const NamedText& text, RawBlock& block) {
+    NumberLines lines(text);
     lines.next("the number of nodes");
     const std::int64_t count = readCount(lines, "number of nodes", 8);
     if (count == 0) lines.fail("there are 0 nodes; nodes in a .poly or .smesh file are not read");
@@ -129,9 +130,9 @@ std::int64_t readNodes(const std::string& path, RawBlock& block) {
     return first;
 }
 
-void readElements(const std::string& path, std::int64_t firstNode, RawBlock& block,
+void readElements(const NamedText& text, std::int64_t firstNode, RawBlock& block,
                   ImportStatistics& statistics) {
-    NumberLines lines(path);
+    NumberLines lines(text);
     lines.next("the number of elements");
     const std::int64_t count = readCount(lines, "number of elements", 10);
     const auto corners = lines.atEnd() ? 4 : lines.read<std::int64_t>("nodes per element");
@@ -166,19 +167,24 @@ void readElements(const std::string& path, std::int64_t firstNode, RawBlock& blo
 
 }  // namespace
 
-RawMesh readTetgen(const std::string& path, const ReadOptions& options) {
-    const std::filesystem::path given(path);
-    const std::string nodePath = std::filesystem::path(given).replace_extension(".node").string();
-    const std::string elementPath = std::filesystem::path(given).replace_extension(".ele").string();
+RawMesh parseTetgen(const NamedText& nodes, const NamedText& elements, const ReadOptions& options) {
     RawMesh raw;
     raw.statistics.format = "TetGen";
     RawBlock block;
-    const std::int64_t firstNode = readNodes(nodePath, block);
-    readElements(elementPath, firstNode, block, raw.statistics);
+    const std::int64_t firstNode = readNodes(nodes, block);
+    readElements(elements, firstNode, block, raw.statistics);
     std::erase_if(block.fields,
                   [&](const Field& field) { return !isWanted(options, field.name, field.location); });
     raw.blocks.push_back(std::move(block));
     return raw;
+}
+
+RawMesh readTetgen(const std::string& path, const ReadOptions& options) {
+    const std::filesystem::path given(path);
+    const std::string nodePath = std::filesystem::path(given).replace_extension(".node").string();
+    const std::string elementPath = std::filesystem::path(given).replace_extension(".ele").string();
+    const MappedFile nodes(nodePath), elements(elementPath);
+    return parseTetgen({nodePath, nodes.bytes()}, {elementPath, elements.bytes()}, options);
 }
 
 }  // namespace tessera

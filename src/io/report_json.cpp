@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "io/json_parse.h"
 
 namespace tessera {
 namespace {
@@ -53,10 +54,15 @@ Json fieldToJson(const FieldError& field) {
     return json;
 }
 
+template <class Integer>
+void read(const Json& json, const char* key, Integer& value) {
+    value = readInteger<Integer>(json.at(key), key);
+}
+
 FieldError fieldFromJson(const Json& json) {
     FieldError field;
     json.at("name").get_to(field.name);
-    json.at("components").get_to(field.components);
+    read(json, "components", field.components);
     json.at("location").get_to(field.location);
     field.range = readNumber(json.at("range"));
     field.max = readNumber(json.at("max"));
@@ -67,9 +73,9 @@ FieldError fieldFromJson(const Json& json) {
     field.relativeRms = readNumber(json.at("relative_rms"));
     const std::vector<double> place = readNumbers(json.at("worst_place"));
     if (place.size() == 3) field.worstPlaceWorld = {place[0], place[1], place[2]};
-    json.at("samples").get_to(field.samples);
-    json.at("skipped_samples").get_to(field.skippedSamples);
-    json.at("valid_points").get_to(field.validPoints);
+    read(json, "samples", field.samples);
+    read(json, "skipped_samples", field.skippedSamples);
+    read(json, "valid_points", field.validPoints);
     field.integralMesh = readNumbers(json.at("integral_mesh"));
     field.integralLattice = readNumbers(json.at("integral_lattice"));
     return field;
@@ -93,16 +99,16 @@ std::string reportToJson(const ErrorReport& report) {
 
 ErrorReport reportFromJson(const std::string& text) {
     try {
-        const Json json = Json::parse(text);
+        const Json json = parseJson<Json>(text);
         ErrorReport report;
         for (const Json& field : json.at("fields")) report.fields.push_back(fieldFromJson(field));
         report.fullyCoveredShare = readNumber(json.at("fully_covered_share"));
-        json.at("nodes").get_to(report.nodes);
-        json.at("centroids").get_to(report.centroids);
-        json.at("outside_bricks").get_to(report.outsideBricks);
-        json.at("covered_points").get_to(report.coveredPoints);
-        json.at("flat_elements").get_to(report.flatElements);
-        json.at("inverted_elements").get_to(report.invertedElements);
+        read(json, "nodes", report.nodes);
+        read(json, "centroids", report.centroids);
+        read(json, "outside_bricks", report.outsideBricks);
+        read(json, "covered_points", report.coveredPoints);
+        read(json, "flat_elements", report.flatElements);
+        read(json, "inverted_elements", report.invertedElements);
         return report;
     } catch (const Json::exception& error) {
         throw InputError(std::string("the error report is damaged: ") + error.what());

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "io/json_parse.h"
 #include "io/report_json.h"
 
 namespace tessera {
@@ -76,16 +77,18 @@ std::string encodeTree(const BrickTree& tree) {
 }
 
 BrickTree decodeTree(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     Vec3d origin;
     for (int axis = 0; axis < 3; ++axis) origin[axis] = json.at("origin").at(std::size_t(axis)).get<double>();
     const double spacing = json.at("spacing").get<double>();
-    const int brickCells = json.at("brick_cells").get<int>();
+    const int brickCells = readInteger<int>(json.at("brick_cells"), "brick_cells");
     if (!(spacing > 0) || !std::isfinite(spacing)) damaged("the spacing of the bricks isn't positive");
     if (brickCells != 8 && brickCells != 16 && brickCells != 32 && brickCells != 64)
         damaged("bricks of " + std::to_string(brickCells) + " cells");
     const Json& levels = json.at("levels");
     if (levels.size() > kMaxLevels) damaged(std::to_string(levels.size()) + " levels");
+    if (!std::isfinite(std::ldexp(spacing, int(levels.size()))))
+        damaged("the spacing of the coarsest level isn't finite");
     std::vector<BrickKey> leaves;
     for (std::size_t level = 0; level < levels.size(); ++level) {
         const Json& list = levels[level];
@@ -96,7 +99,8 @@ BrickTree decodeTree(const std::string& text) {
             BrickKey key;
             key.level = int(level);
             for (int axis = 0; axis < 3; ++axis) {
-                const std::int64_t index = list[i + std::size_t(axis)].get<std::int64_t>();
+                const std::int64_t index =
+                    readInteger<std::int64_t>(list[i + std::size_t(axis)], "a brick index");
                 if (index < -limit || index >= limit)
                     damaged("brick index " + std::to_string(index) + " out of range");
                 key.index[axis] = int(index);
@@ -116,7 +120,7 @@ std::string encodeBounds(const Box3d& box) {
 }
 
 Box3d decodeBounds(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     if (json.size() != 6) damaged("tessera_bounds isn't six numbers");
     Box3d box;
     for (int axis = 0; axis < 3; ++axis) {
@@ -143,7 +147,7 @@ std::string encodeFields(const std::vector<OutputField>& fields) {
 }
 
 std::vector<OutputField> decodeFields(const std::string& text) {
-    const Json json = Json::parse(text);
+    const Json json = parseJson<Json>(text);
     std::vector<OutputField> fields;
     int channels = 0;
     for (const Json& entry : json) {
@@ -151,8 +155,8 @@ std::vector<OutputField> decodeFields(const std::string& text) {
         entry.at("name").get_to(field.name);
         entry.at("source").get_to(field.sourceName);
         entry.at("location").get_to(field.location);
-        entry.at("components").get_to(field.components);
-        entry.at("first_channel").get_to(field.firstChannel);
+        field.components = readInteger<int>(entry.at("components"), "components");
+        field.firstChannel = readInteger<int>(entry.at("first_channel"), "first_channel");
         if (field.components < 1 || field.components > 64)
             damaged("a field of " + std::to_string(field.components) + " components");
         if (field.firstChannel != channels) damaged("the fields' channels don't follow each other");
@@ -215,6 +219,9 @@ double chooseUnitScale(double finestSpacingWorld, double requested) {
     if (finestSpacingWorld >= kComfortableFileSpacing) return scale;
     for (int power = 1; power <= 300 && finestSpacingWorld * scale < 1e-3; ++power)
         scale = readDouble("1e" + std::to_string(power), "power of ten");
+    if (!(finestSpacingWorld * scale >= kSmallestFileSpacing))
+        throw InputError("the finest voxel is " + exactText(finestSpacingWorld) +
+                         " units: too small for OpenVDB in any unit");
     return scale;
 }
 

@@ -31,6 +31,8 @@ constexpr std::size_t kUuidBytes = 36;
 
 constexpr std::int64_t kDefaultFlatPoints = std::int64_t(1) << 26;  // seconds of work
 constexpr std::int64_t kMostFlatPoints = std::int64_t(1) << 31;
+constexpr double kLost =
+    std::numeric_limits<double>::infinity();  // of an error in voxels: one voxel falls on another
 
 openvdb::Coord coord(const Vec3i& p) {
     return openvdb::Coord(p.x, p.y, p.z);
@@ -429,6 +431,35 @@ std::int64_t quarterOfMemory() {
                                       : std::numeric_limits<std::int64_t>::max();
 }
 
+/// How far the file's transform puts the furthest sample from its place, in finest voxels. OpenVDB takes the
+/// spacing of a transform that isn't turned as a difference of places, which far from the origin is rounded.
+double placeErrorVoxels(const BrickTree& tree, const VdbWriteOptions& options, double unitScale) {
+    if (options.upAxis != UpAxis::keep) return 0;
+    const double spacing = tree.spacingWorld(0) * unitScale;
+    double worst = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double origin = tree.originWorld()[axis] * unitScale;
+        double furthest = 1;
+        for (const BrickKey& leaf : tree.leaves())
+            furthest = std::max(furthest,
+                                std::ldexp(std::abs(leaf.index[axis]) + 1.0, leaf.level) * tree.brickCells());
+        const double error = std::abs((origin + spacing) - origin - spacing) / spacing;
+        worst = std::max(worst, error >= 0.5 ? kLost : error * furthest);
+    }
+    return worst;
+}
+
+void checkPlace(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteResult& result) {
+    const double error = placeErrorVoxels(tree, options, result.unitScale);
+    const std::string far = "voxels of " + exactText(tree.spacingWorld(0)) + " units are so small beside " +
+                            "the distance from the origin that ";
+    if (error == kLost) throw InputError(far + "OpenVDB can't tell one from the next: move the mesh");
+    if (error > 0.01)
+        result.notes.push_back(far + "the file's transforms are off by up to " +
+                               exactText(std::round(100 * error) / 100) +
+                               " voxels; tessera_bricks in the file is exact");
+}
+
 void chooseFrame(const BrickTree& tree, int channels, const VdbWriteOptions& options,
                  VdbWriteResult& result) {
     result.unitScale = chooseUnitScale(tree.spacingWorld(0), options.unitScale);
@@ -438,6 +469,7 @@ void chooseFrame(const BrickTree& tree, int channels, const VdbWriteOptions& opt
                                exactText(result.unitScale) +
                                " of the mesh's (see tessera_unit_scale in the file)");
     }
+    checkPlace(tree, options, result);
     if (options.layout == VdbLayout::levels) return;
     FlatGridPlan plan = planFlatGrid(tree, channels, options);
     result.flatLevel = plan.level;

@@ -37,7 +37,11 @@ class BoxTree {
     /// Calls visit(place) for every item whose box meets the closed box.
     template <class Visit>
     void visitOverlaps(const Box3d& box, Visit&& visit) const {
-        if (!empty() && !box.empty()) visitOverlaps(levelCount() - 1, 0, box, visit);
+        if (empty() || box.empty()) return;
+        // An infinite box would meet the absent children too.
+        constexpr double kLargest = std::numeric_limits<double>::max();
+        const Box3d finite{glm::max(box.min, Vec3d(-kLargest)), glm::min(box.max, Vec3d(kLargest))};
+        visitOverlaps(levelCount() - 1, 0, finite, visit);
     }
 
   private:

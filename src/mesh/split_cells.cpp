@@ -25,6 +25,10 @@ constexpr std::int64_t kCellChunk = 1 << 12;
 constexpr double kLeastCosine = 0.8;
 constexpr double kLeastShare = 0.05;
 
+/// Starts of a fan and apexes of a cone that are tried: more than the cells of any mesher have nodes. In a
+/// damaged file a cell may have a million, and trying all would take the square of that.
+constexpr std::size_t kMostTried = 256;
+
 /// A face of a fixed kind of cell: local nodes counter-clockwise seen from outside.
 struct LocalFace {
     int count;
@@ -133,8 +137,26 @@ class Splitter {
             if (t[0] == node || t[1] == node || t[2] == node) continue;
             const int sign = volumeSign(place(t[0]), place(t[2]), place(t[1]), apex);
             signs = {std::min(signs.first, sign), std::max(signs.second, sign)};
+            if (signs == std::pair(-1, 1)) break;
         }
         return signs;
+    }
+
+    /// Mean of the cell's nodes; finite where they are.
+    Vec3d centreOfNodes() const {
+        const auto count = double(nodes_.size());
+        Vec3d sum(0);
+        for (const std::int32_t node : nodes_) sum += place(node) - place(nodes_[0]);
+        const Vec3d centre = place(nodes_[0]) + sum / count;
+        if (std::isfinite(centre.x) && std::isfinite(centre.y) && std::isfinite(centre.z)) return centre;
+        // A difference left the range of double: parts of the places, with larger rounding, don't.
+        Vec3d mean(0);
+        Box3d box;
+        for (const std::int32_t node : nodes_) {
+            mean += place(node) / count;
+            box.include(place(node));
+        }
+        return glm::clamp(mean, box.min, box.max);
     }
 
     /// Six times the signed volume inside the triangles.
@@ -193,7 +215,7 @@ std::size_t Splitter::chooseFanStart() const {
     double bestShare = smallestShare;
     std::size_t best = 0;
     // Opposite nodes of a quad give the same fan.
-    for (std::size_t k = 1; k < (n == 4 ? 2 : n); ++k) {
+    for (std::size_t k = 1; k < (n == 4 ? 2 : std::min(n, kMostTried)); ++k) {
         const double share = worstShare(k, unused);
         if (share <= bestShare) continue;
         best = k;
@@ -236,9 +258,7 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     }
     std::sort(nodes_.begin(), nodes_.end(), smaller);
     nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
-    Vec3d centre(0);
-    for (const std::int32_t node : nodes_) centre += place(node) - place(nodes_[0]);
-    centre = place(nodes_[0]) + centre / double(nodes_.size());
+    const Vec3d centre = centreOfNodes();
     const double volume = volumeInside(centre);
     const auto allKeepSign = [&](std::pair<int, int> signs) {
         return volume < 0 ? signs.second < 0 : signs.first > 0;
@@ -248,7 +268,7 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     };
 
     std::int32_t withSlivers = -1, withFlat = -1;
-    for (const std::int32_t node : nodes_) {
+    for (const std::int32_t node : std::span(nodes_).first(std::min(nodes_.size(), kMostTried))) {
         const auto signs = coneSigns(place(node), node);
         if (allKeepSign(signs) && !grazes(node)) {
             emitCone(node);
@@ -292,12 +312,14 @@ void Splitter::orientFaces(std::vector<std::vector<std::int32_t>>& faces) const 
         for (std::size_t next = 0; next < component.size(); ++next) {
             const std::size_t f = component[next];
             forEachEdge(f, [&](std::int32_t a, std::int32_t b) {
-                for (const std::size_t g : facesOfEdge[std::minmax(a, b)]) {
+                std::vector<std::size_t>& there = facesOfEdge[std::minmax(a, b)];
+                for (const std::size_t g : there) {
                     if (state[g] != unseen) continue;
                     const bool sameDirection = runsThrough(g, a, b);
                     state[g] = sameDirection == (state[f] == kept) ? turned : kept;
                     component.push_back(g);
                 }
+                there.clear();  // all of them are seen now
             });
         }
         const auto turnedCount = std::count_if(component.begin(), component.end(),

@@ -1,0 +1,195 @@
+#!/usr/bin/env python3
+"""Runs tessera on damaged meshes: it must end with exit code 0 or 2, soon, in little memory, with one line of error and no file left behind.
+
+usage: run_mutated.py --tessera PROGRAM [--count N] [--seed S] [--first I] [--jobs J] [--keep FOLDER]
+
+The undamaged files are read first and must be accepted. A mutant that breaks a rule is kept, with the command and what went wrong, in a folder named by
+its seed and index.
+"""
+
+import argparse
+import collections
+import concurrent.futures
+import dataclasses
+import os
+import pathlib
+import random
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import mutate_mesh
+
+LONGEST_S = 10
+LARGEST_BYTES = 2 << 30
+POLL_S = 0.02
+
+COMMANDS = {
+    "info": (["info", "{mesh}", "--json", "out.json"], "out.json"),
+    "tets": (["tets", "{mesh}", "-o", "out.vtu", "--quiet"], "out.vtu"),
+    "uniform": (["resample", "{mesh}", "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "20"], "out.vdb"),
+    "element-size": (["resample", "{mesh}", "-o", "out.vdb", "--quiet", "--max-memory", "100M"], "out.vdb"),
+    "error": (["resample", "{mesh}", "-o", "out.vdb", "--quiet", "--refine", "error", "--max-error", "5%", "--max-memory", "30M"], "out.vdb"),
+    "slice": (["slice", "{mesh}", "-o", "out.exr", "--quiet", "--normal", "1,2,3", "--resolution", "64"], "out.exr"),
+}  # fmt: skip
+
+
+@dataclasses.dataclass
+class Run:
+    name: str
+    code: int  # as subprocess has it: negative for a signal
+    seconds: float
+    peak_bytes: int
+    faults: list
+    stderr: str = ""
+
+
+def tree_bytes(pid):
+    """Resident memory of a process and its children."""
+    total, page = 0, os.sysconf("SC_PAGE_SIZE")
+    try:
+        total += int(pathlib.Path(f"/proc/{pid}/statm").read_text().split()[1]) * page
+        for child in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            total += tree_bytes(int(child))
+    except (OSError, IndexError):
+        pass  # it has just ended
+    return total
+
+
+def measured(command, folder):
+    """Exit code, seconds, peak bytes of the process and its children, standard error; ends what runs too long or grows too large."""
+    begin = time.monotonic()
+    with open(folder / ".stderr", "wb") as errors:
+        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
+    watch = os.pidfd_open(process.pid)
+    peak = 0
+    try:
+        # Some room beyond the limits, so that what is reported is how far a run went and not where it was ended.
+        while not select.select([watch], [], [], POLL_S)[0]:
+            peak = max(peak, tree_bytes(process.pid))
+            if time.monotonic() - begin > 2 * LONGEST_S or peak > 1.5 * LARGEST_BYTES:
+                os.killpg(process.pid, signal.SIGKILL)
+    finally:
+        os.close(watch)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    seconds = time.monotonic() - begin
+    text = (folder / ".stderr").read_bytes().decode(errors="replace")
+    (folder / ".stderr").unlink()
+    # The children that were waited for count too: the kernel keeps the largest.
+    return process.returncode, seconds, max(peak, usage.ru_maxrss << 10), text
+
+
+def faults_of(code, seconds, peak, stderr, new_files, output):
+    faults = []
+    if code not in (0, 2):
+        faults.append(f"ended by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}")
+    if seconds > LONGEST_S:
+        faults.append(f"took {seconds:.1f} s")
+    if peak > LARGEST_BYTES:
+        faults.append(f"peak memory {peak >> 20} MiB")
+    lines = stderr.split("\n")
+    if lines[-1] != "":
+        faults.append("the last line on stderr has no end")
+    errors = [line for line in lines[:-1] if not line.startswith("tessera: warning: ")]
+    if any(not line.startswith("tessera: ") for line in errors):
+        faults.append("a line on stderr that isn't tessera's")
+    if len(errors) != (0 if code == 0 else 1):
+        faults.append(f"{len(errors)} lines of error")
+    if any(ord(c) < 32 or ord(c) == 127 for line in lines for c in line):
+        faults.append("control characters on stderr")
+    expected = {output} if code == 0 else set()
+    if new_files != expected:
+        faults.append(f"files {sorted(new_files)}, expected {sorted(expected)}")
+    return faults
+
+
+def run_case(program, name, files, mesh, command_name, keep, origin):
+    """Runs one command on one mesh in a folder of its own."""
+    words, output = COMMANDS[command_name]
+    arguments = [word.format(mesh=mesh) for word in words]
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-mutant-"))
+    try:
+        for file_name, data in files.items():
+            (folder / file_name).write_bytes(data)
+        code, seconds, peak, stderr = measured([program, *arguments], folder)
+        new_files = {str(p.relative_to(folder)) for p in folder.rglob("*")} - set(files)
+        faults = faults_of(code, seconds, peak, stderr, new_files, output)
+        if faults:
+            place = keep / name
+            shutil.rmtree(place, ignore_errors=True)
+            place.mkdir(parents=True)
+            for file_name, data in files.items():
+                (place / file_name).write_bytes(data)
+            (place / "report.txt").write_text(
+                f"tessera {' '.join(arguments)}\nfrom {origin}\n{'; '.join(faults)}\nexit code {code}, {seconds:.2f} s, {peak >> 20} MiB\n{stderr}"
+            )
+        return Run(f"{name} ({command_name}; {origin})", code, seconds, peak, faults, stderr)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def run_mutant(program, seed, index, keep):
+    files, mesh, origin = mutate_mesh.make_mutant(seed, index)
+    command = random.Random(f"{seed}:{index}:command").choice(list(COMMANDS))
+    return run_case(program, f"mutant_{seed}_{index}", files, mesh, command, keep, origin)
+
+
+def run_sound(program, name, keep):
+    """An undamaged file must be read: otherwise its mutants would test nothing."""
+    file = mutate_mesh.sound_files()[name]()
+    run = run_case(program, f"sound_{name}", {"mesh" + file.extension: file.serialise()}, "mesh" + file.extension, "tets", keep, name)
+    if run.code != 0 and not run.faults:
+        run.faults.append(f"an undamaged file was refused: {run.stderr.strip()}")
+    return run
+
+
+def summarise(runs, title):
+    codes = collections.Counter(run.code for run in runs)
+    print(f"{title}: {len(runs)} runs; exit codes " + ", ".join(f"{code}: {count}" for code, count in sorted(codes.items())))
+    slowest, largest = max(runs, key=lambda r: r.seconds), max(runs, key=lambda r: r.peak_bytes)
+    print(f"  slowest {slowest.seconds:.2f} s: {slowest.name}\n  largest {largest.peak_bytes >> 20} MiB: {largest.name}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tessera", required=True)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--seed", default="1")
+    parser.add_argument("--first", type=int, default=0, help="index of the first mutant")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=pathlib.Path, default=pathlib.Path("mutants"), help="where offending meshes go (default: ./mutants)")
+    parser.add_argument("--skip-sound", action="store_true", help="leave out the undamaged files")
+    arguments = parser.parse_args()
+    program = str(pathlib.Path(arguments.tessera).resolve())
+    keep = arguments.keep.resolve()
+    print(f"seed {arguments.seed}, mutants {arguments.first} to {arguments.first + arguments.count - 1}", flush=True)
+    runs = []
+    with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+        if not arguments.skip_sound:
+            runs = list(pool.map(lambda name: run_sound(program, name, keep), mutate_mesh.sound_files()))
+            summarise(runs, "undamaged")
+        indices = range(arguments.first, arguments.first + arguments.count)
+        mutants = []
+        for run in pool.map(lambda i: run_mutant(program, arguments.seed, i, keep), indices):
+            mutants.append(run)
+            if len(mutants) % 1000 == 0:
+                print(f"  {len(mutants)} mutants, {sum(bool(r.faults) for r in mutants)} offend", flush=True)
+        if mutants:
+            summarise(mutants, "mutants")
+    offending = [run for run in runs + mutants if run.faults]
+    for run in offending:
+        print(f"FAILED {run.name}: {'; '.join(run.faults)}")
+    if offending:
+        print(f"{len(offending)} of {len(runs) + len(mutants)} runs broke a rule; their meshes are in {keep}")
+    else:
+        print("every run kept the rules")
+    return 1 if offending else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
