@@ -481,6 +481,78 @@ TEST(Repair, RefusesOptionsOutOfRange) {
     EXPECT_THROW(repair(test::goodBox(1), options, report, {}), InputError);
 }
 
+/// The mesh with a change done to it.
+TetMesh changed(const TetMesh& mesh, const Change& change) {
+    TetMesh result;
+    result.points = mesh.points;
+    if (change.hasNewNode) result.points.push_back(change.newNode.pointWorld);
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        if (!std::binary_search(change.removed.begin(), change.removed.end(), e))
+            result.tets.push_back(mesh.tets[std::size_t(e)]);
+    for (const Change::Added& added : change.added) result.tets.push_back(added.tet);
+    return result;
+}
+
+struct Tally {
+    int allowed = 0;
+    std::array<int, kRefusals> refused{};
+};
+
+/// Judges every merge of every element on its own, and does those that are allowed to see what they do.
+Tally judgeAll(const TetMesh& mesh, const ChangeLimits& limits) {
+    const TetComplex complex(mesh);
+    ChangeJudge judge(complex);
+    const double volume = exactVolume(mesh);
+    Tally tally;
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        for (const Merge& merge : allMerges(complex.tet(e), cornersOf(mesh, e))) {
+            const Change change = changeOf(complex, merge);
+            const Verdict verdict = judge.judge(change, limits);
+            if (!verdict.allowed) {
+                ++tally.refused[std::size_t(verdict.refusal)];
+                continue;
+            }
+            ++tally.allowed;
+            const TetMesh result = changed(mesh, change);
+            std::int64_t notPositive = 0;
+            for (std::int64_t r = 0; r < result.elementCount(); ++r) notPositive += signOf(result, r) <= 0;
+            EXPECT_EQ(notPositive, 0);
+            EXPECT_EQ(countCrowdedFaces(result), 0);
+            EXPECT_NEAR(exactVolume(result), volume, 1e-12 * volume);
+        }
+    return tally;
+}
+
+TEST(ChangeJudge, AllowsOnlyWhatKeepsTheMeshSound) {
+    TetMesh mesh = gradedDelaunayMesh(60, 1, 5);
+    for (std::int64_t e = 0; e < mesh.elementCount(); ++e)
+        if (signOf(mesh, e) < 0) std::swap(mesh.tets[std::size_t(e)][2], mesh.tets[std::size_t(e)][3]);
+    const Tally tally = judgeAll(mesh, {0.03, 1e-9, std::numeric_limits<double>::infinity()});
+    EXPECT_GT(tally.allowed, 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::inversion)], 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::boundary)], 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::quality)], 10);
+}
+
+TEST(ChangeJudge, RefusesAFaceThatGetsAnotherNeighbour) {
+    TetMesh mesh;
+    // Nodes u, v, x, y, z, w. Once u is v, the face v x y would have an element on each side.
+    mesh.points = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0.1}, {0, 1, 0.1}, {1, 1, 2}, {1, 1, -2}};
+    mesh.tets = {{0, 2, 3, 4}, {1, 3, 2, 5}, {0, 1, 5, 4}};
+    for (std::int64_t e = 0; e < 3; ++e)
+        if (signOf(mesh, e) < 0) std::swap(mesh.tets[std::size_t(e)][2], mesh.tets[std::size_t(e)][3]);
+    const TetComplex complex(mesh);
+    const Merge merge{{{0}, 1}, {{1}, 1}, 1, {}, 2};
+    const Change change = changeOf(complex, merge);
+    ASSERT_EQ(change.removed.size(), 2u);
+    ASSERT_EQ(signOf(changed(mesh, change), 1), 1);
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    const ChangeLimits limits{0.9, kAny, kAny};
+    const Verdict verdict = ChangeJudge(complex).judge(change, limits);
+    EXPECT_FALSE(verdict.allowed);
+    EXPECT_EQ(verdict.refusal, Refusal::conformity);
+}
+
 TEST(ElementClass, IsThatOfTheShape) {
     const double h = 1e-7;
     const std::pair<Corners, ElementClass> cases[] = {
