@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include "base/error.h"
+#include "mesh/flat_elements.h"
 #include "mesh/mesh_quality.h"
 #include "reference/fields.h"
 #include "reference/random.h"
@@ -551,6 +553,49 @@ TEST(ChangeJudge, RefusesAFaceThatGetsAnotherNeighbour) {
     const Verdict verdict = ChangeJudge(complex).judge(change, limits);
     EXPECT_FALSE(verdict.allowed);
     EXPECT_EQ(verdict.refusal, Refusal::conformity);
+}
+
+/// Inner faces that both elements see from the same side.
+int countFoldedFaces(const TetComplex& complex) {
+    constexpr std::size_t kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    std::map<std::array<std::int32_t, 3>, std::pair<int, int>> sides;
+    for (std::int32_t e = 0; e < complex.elementCount(); ++e)
+        for (const auto& f : kFaces) {
+            const Tet& tet = complex.tet(e);
+            std::array<std::int32_t, 3> face{tet[f[0]], tet[f[1]], tet[f[2]]};
+            int swaps = 0;
+            for (const std::size_t i : {0u, 1u, 0u})
+                if (face[i] > face[i + 1]) std::swap(face[i], face[i + 1]), ++swaps;
+            (swaps % 2 == 0 ? sides[face].first : sides[face].second) += 1;
+        }
+    int folded = 0;
+    for (const auto& [face, count] : sides) folded += count.first + count.second == 2 && count.first != 1;
+    return folded;
+}
+
+TEST(FlatElements, ContinueTheOrientationOfTheirNeighbours) {
+    TetMesh mesh = test::sliverLayer(0);
+    std::vector<std::int32_t> flat;
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        if (signOf(mesh, e) == 0) {
+            flat.push_back(e);
+            if (e % 3 == 0) std::swap(mesh.tets[std::size_t(e)][0], mesh.tets[std::size_t(e)][1]);
+        }
+    ASSERT_EQ(flat.size(), 16u);
+    TetComplex complex(mesh);
+    EXPECT_GT(countFoldedFaces(complex), 0);
+    orientFlatElements(complex, flat);
+    EXPECT_EQ(countFoldedFaces(complex), 0);
+    // Between the two boxes they hold faces of both sides together.
+    for (const std::int32_t e : flat) EXPECT_FALSE(isLooseFlatElement(complex, e));
+}
+
+TEST(FlatElements, AreLooseWhereOnlyOneSideIsShared) {
+    TetMesh mesh = boxMesh({.cells = {1, 1, 1}, .isFiveSplit = true});
+    const auto upper = std::int32_t(4);  // nodes 4 to 7 are the side z = 1
+    mesh.tets.push_back({upper, upper + 1, upper + 2, upper + 3});
+    const std::int32_t flat = std::int32_t(mesh.elementCount()) - 1;
+    EXPECT_TRUE(isLooseFlatElement(TetComplex(mesh), flat));
 }
 
 TEST(ElementClass, IsThatOfTheShape) {
