@@ -7,9 +7,11 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <sstream>
 
 #include "base/error.h"
+#include "mesh/flat_elements.h"
 #include "mesh/mesh_quality.h"
 #include "reference/fields.h"
 #include "reference/random.h"
@@ -479,6 +481,121 @@ TEST(Repair, RefusesOptionsOutOfRange) {
     options = {};
     options.limits.maxDihedralDegrees = 180;
     EXPECT_THROW(repair(test::goodBox(1), options, report, {}), InputError);
+}
+
+/// The mesh with a change done to it.
+TetMesh changed(const TetMesh& mesh, const Change& change) {
+    TetMesh result;
+    result.points = mesh.points;
+    if (change.hasNewNode) result.points.push_back(change.newNode.pointWorld);
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        if (!std::binary_search(change.removed.begin(), change.removed.end(), e))
+            result.tets.push_back(mesh.tets[std::size_t(e)]);
+    for (const Change::Added& added : change.added) result.tets.push_back(added.tet);
+    return result;
+}
+
+struct Tally {
+    int allowed = 0;
+    std::array<int, kRefusals> refused{};
+};
+
+/// Judges every merge of every element on its own, and does those that are allowed to see what they do.
+Tally judgeAll(const TetMesh& mesh, const ChangeLimits& limits) {
+    const TetComplex complex(mesh);
+    ChangeJudge judge(complex);
+    const double volume = exactVolume(mesh);
+    Tally tally;
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        for (const Merge& merge : allMerges(complex.tet(e), cornersOf(mesh, e))) {
+            const Change change = changeOf(complex, merge);
+            const Verdict verdict = judge.judge(change, limits);
+            if (!verdict.allowed) {
+                ++tally.refused[std::size_t(verdict.refusal)];
+                continue;
+            }
+            ++tally.allowed;
+            const TetMesh result = changed(mesh, change);
+            std::int64_t notPositive = 0;
+            for (std::int64_t r = 0; r < result.elementCount(); ++r) notPositive += signOf(result, r) <= 0;
+            EXPECT_EQ(notPositive, 0);
+            EXPECT_EQ(countCrowdedFaces(result), 0);
+            EXPECT_NEAR(exactVolume(result), volume, 1e-12 * volume);
+        }
+    return tally;
+}
+
+TEST(ChangeJudge, AllowsOnlyWhatKeepsTheMeshSound) {
+    TetMesh mesh = gradedDelaunayMesh(60, 1, 5);
+    for (std::int64_t e = 0; e < mesh.elementCount(); ++e)
+        if (signOf(mesh, e) < 0) std::swap(mesh.tets[std::size_t(e)][2], mesh.tets[std::size_t(e)][3]);
+    const Tally tally = judgeAll(mesh, {0.03, 1e-9, std::numeric_limits<double>::infinity()});
+    EXPECT_GT(tally.allowed, 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::inversion)], 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::boundary)], 10);
+    EXPECT_GT(tally.refused[std::size_t(Refusal::quality)], 10);
+}
+
+TEST(ChangeJudge, RefusesAFaceThatGetsAnotherNeighbour) {
+    TetMesh mesh;
+    // Nodes u, v, x, y, z, w. Once u is v, the face v x y would have an element on each side.
+    mesh.points = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0.1}, {0, 1, 0.1}, {1, 1, 2}, {1, 1, -2}};
+    mesh.tets = {{0, 2, 3, 4}, {1, 3, 2, 5}, {0, 1, 5, 4}};
+    for (std::int64_t e = 0; e < 3; ++e)
+        if (signOf(mesh, e) < 0) std::swap(mesh.tets[std::size_t(e)][2], mesh.tets[std::size_t(e)][3]);
+    const TetComplex complex(mesh);
+    const Merge merge{{{0}, 1}, {{1}, 1}, 1, {}, 2};
+    const Change change = changeOf(complex, merge);
+    ASSERT_EQ(change.removed.size(), 2u);
+    ASSERT_EQ(signOf(changed(mesh, change), 1), 1);
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    const ChangeLimits limits{0.9, kAny, kAny};
+    const Verdict verdict = ChangeJudge(complex).judge(change, limits);
+    EXPECT_FALSE(verdict.allowed);
+    EXPECT_EQ(verdict.refusal, Refusal::conformity);
+}
+
+/// Inner faces that both elements see from the same side.
+int countFoldedFaces(const TetComplex& complex) {
+    constexpr std::size_t kFaces[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    std::map<std::array<std::int32_t, 3>, std::pair<int, int>> sides;
+    for (std::int32_t e = 0; e < complex.elementCount(); ++e)
+        for (const auto& f : kFaces) {
+            const Tet& tet = complex.tet(e);
+            std::array<std::int32_t, 3> face{tet[f[0]], tet[f[1]], tet[f[2]]};
+            int swaps = 0;
+            for (const std::size_t i : {0u, 1u, 0u})
+                if (face[i] > face[i + 1]) std::swap(face[i], face[i + 1]), ++swaps;
+            (swaps % 2 == 0 ? sides[face].first : sides[face].second) += 1;
+        }
+    int folded = 0;
+    for (const auto& [face, count] : sides) folded += count.first + count.second == 2 && count.first != 1;
+    return folded;
+}
+
+TEST(FlatElements, ContinueTheOrientationOfTheirNeighbours) {
+    TetMesh mesh = test::sliverLayer(0);
+    std::vector<std::int32_t> flat;
+    for (std::int32_t e = 0; e < mesh.elementCount(); ++e)
+        if (signOf(mesh, e) == 0) {
+            flat.push_back(e);
+            if (e % 3 == 0) std::swap(mesh.tets[std::size_t(e)][0], mesh.tets[std::size_t(e)][1]);
+        }
+    ASSERT_EQ(flat.size(), 16u);
+    TetComplex complex(mesh);
+    EXPECT_GT(countFoldedFaces(complex), 0);
+    orientFlatElements(complex, flat);
+    EXPECT_EQ(countFoldedFaces(complex), 0);
+    // Between the two boxes they hold faces of both sides together.
+    for (const std::int32_t e : flat) EXPECT_FALSE(isLooseFlatElement(complex, e));
+}
+
+TEST(FlatElements, AreLooseWhereOnlyOneSideIsShared) {
+    TetMesh mesh = boxMesh({.cells = {1, 1, 1}, .isFiveSplit = true});
+    const auto upper = std::int32_t(4);  // nodes 4 to 7 are the side z = 1
+    mesh.tets.push_back({upper, upper + 1, upper + 2, upper + 3});
+    const std::int32_t flat = std::int32_t(mesh.elementCount()) - 1;
+    EXPECT_TRUE(isLooseFlatElement(TetComplex(mesh), flat));
 }
 
 TEST(ElementClass, IsThatOfTheShape) {

@@ -25,7 +25,7 @@ constexpr double kDeviation = 4;
 constexpr double kNear = 10;
 
 /// What is tried, in this order, until one succeeds.
-enum class Step { recipe, near, drop, any, dropFlat };
+enum class Step { recipe, near, drop, dropFlat, any };
 constexpr std::size_t kSteps = 5;
 
 double longestEdge(const Corners& c) {
