@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Configures and builds one preset: scripts/build.sh [release|debug|asan|tsan] [target...]. Uses ccache when it is there,
+# Configures and builds one preset: scripts/build.sh [release|debug|asan|tsan|fuzz] [target...]. Uses ccache when it is there,
 # unless TESSERA_CCACHE=0.
 # TESSERA_CMAKE_ARGS adds arguments to the configuration; TESSERA_JOBS sets the number of compilers at once.
 set -euo pipefail
