@@ -4,7 +4,8 @@ tessera_precompile(hard_cases)
 
 tessera_test(hard_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
 tessera_test(perturbed_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
-set_tests_properties(hard_cases_test perturbed_cases_test PROPERTIES TIMEOUT 900)
+tessera_test(repair_hard_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
+set_tests_properties(repair_hard_cases_test hard_cases_test perturbed_cases_test PROPERTIES TIMEOUT 900)
 tessera_split_device_tests(hard_cases_test perturbed_cases_test)
 if(TESSERA_SANITIZE MATCHES address)
   # The bits must be the same here; the contract at every point is checked in the release build.
