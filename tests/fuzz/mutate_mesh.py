@@ -481,7 +481,7 @@ def damage_topology(file, rng):
         rng.shuffle(array.values)
     else:
         highest = max(array.values, default=0)
-        change_values(array, rng, NUMBERS + list(range(-1, highest + 3)))
+        change_values(array, rng, NUMBERS + list(range(-1, min(highest, 1000) + 3)))
 
 
 def damage_all_types(file, rng):
