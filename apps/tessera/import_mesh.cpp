@@ -136,8 +136,8 @@ ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
     file.repairMs = timer.elapsedMs();
     if (file.mesh.tets.empty())
         throw InputError(fmt::format(
-            "{}: --repair leaves nothing of {} elements, all of an aspect ratio below {:g}: a smaller "
-            "--repair-aspect or --repair-max-volume-loss keeps them",
+            "{}: the repair leaves nothing of {} elements, all of an aspect ratio below {:g} (those of zero "
+            "volume always go)",
             path, file.repair->elementsBefore, options->limits.minAspect));
     return file;
 }

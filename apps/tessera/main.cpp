@@ -21,9 +21,9 @@ namespace {
 constexpr int kExitFailure = 1;
 constexpr int kExitBadInput = 2;
 
-/// One line on standard error, whatever the message holds.
+/// One line on standard error, whatever the message holds. Where it can't be written the exit code has to do.
 void printError(const char* message) {
-    fmt::print(stderr, "tessera: {}\n", tessera::singleLine(message));
+    std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
 }
 
 struct Arguments {

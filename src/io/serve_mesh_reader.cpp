@@ -100,8 +100,9 @@ bool memoryTakes(std::int64_t bytes) {
            rlim_t(bytes) <= limit.rlim_cur;
 }
 
-void handOver(MeshFile file) {
+void handOver(MeshFile file, std::int64_t memoryBytes) {
     const std::int64_t bytes = packetBytes(file);
+    if (bytes > memoryBytes) throw std::bad_alloc();  // the parent would take it for garbage
     if (memoryTakes(bytes)) {
         writePacket(std::move(file),
                     [](const void* data, std::size_t count) { writeAll(kMeshDescriptor, data, count); });
@@ -140,7 +141,7 @@ int serveMeshReader(std::span<const std::string> arguments, const MeshReader& re
     try {
         Execution execution;
         execution.threads = request.threads;
-        handOver(read(request.path, request.options, execution));
+        handOver(read(request.path, request.options, execution), request.memoryBytes);
     } catch (const TooLargeError&) {
         report(memoryRanOut, {});
     } catch (const std::bad_alloc&) {

@@ -66,7 +66,8 @@ class Table {
         }
     }
 
-    void run() {
+    /// False when there is no case to run.
+    bool run() {
         for (const HardCase& hardCase : hardCases())
             if (hardCase.name.find(arguments_.only) != std::string::npos) runCase(hardCase);
         for (const auto* subjects : {&algorithms_, &formats_})
@@ -79,6 +80,7 @@ class Table {
                 fmt::print(stderr, "perturbed, {}: {}\n", subject.name,
                            perturbed_[subject.name].total.summary());
             }
+        return !rows_.empty();
     }
 
     bool isClean() const {
@@ -250,8 +252,15 @@ int main(int argc, char** argv) {
     app.add_option("--seed", arguments.seed, "the first perturbed case");
     app.add_option("--update", arguments.update, "write the tables between the markers of this file");
     CLI11_PARSE(app, argc, argv);
+    if (!arguments.update.empty() && (!arguments.only.empty() || !arguments.algorithms.empty())) {
+        fmt::print(stderr, "--update takes the whole gallery, without --only and --algorithms\n");
+        return 2;
+    }
     Table table(arguments);
-    table.run();
+    if (!table.run()) {
+        fmt::print(stderr, "no case has '{}' in its name\n", arguments.only);
+        return 2;
+    }
     const std::string text = table.markdown();
     std::fputs(text.c_str(), stdout);
     if (!arguments.update.empty() && !updateFile(arguments.update, text)) return 1;

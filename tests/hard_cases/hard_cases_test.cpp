@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -14,6 +15,7 @@
 #include <map>
 #include <sstream>
 
+#include "mesh/element_class.h"
 #include "registry/registry.h"
 
 namespace tessera::hard_cases {
@@ -166,6 +168,8 @@ Block assembled(const LatticeCase& at, const std::vector<Block>& parts) {
     return whole;
 }
 
+constexpr const char* kThinTitles[] = {"Needles", "Spindles", "Slivers", "Caps"};
+
 class HardCaseHashes : public testing::TestWithParam<HardCase> {};
 
 TEST_P(HardCaseHashes, AreThoseListed) {
@@ -214,22 +218,24 @@ TEST(HardCaseList, HasEachNameOnceAndNoHashTooMany) {
         EXPECT_TRUE(names.contains(name)) << name << " in " << hashListPath();
 }
 
-TEST(HardCaseList, ThinKindsAreAsThinAsTheySay) {
-    // Hand-picked: the least height of a thin element over its longest edge is about what the name says.
+TEST(HardCaseList, ThinElementsAreAsThinAsTheirNamesSay) {
+    int checked = 0;
     for (const HardCase& hardCase : hardCases()) {
-        if (hardCase.name != "CapsInAGoodMesh1e6" && hardCase.name != "SliversInAGoodMesh1e6") continue;
+        const std::size_t digits = hardCase.name.find("1e");
+        const bool isThinKind =
+            std::any_of(std::begin(kThinTitles), std::end(kThinTitles),
+                        [&](const char* title) { return hardCase.name.starts_with(title); });
+        if (!isThinKind || digits == std::string::npos) continue;
         const TetMesh mesh = hardCase.make();
         double least = 1;
-        for (const auto& tet : mesh.tets) {
-            const auto at = [&](std::size_t i) { return mesh.points[std::size_t(tet[i % 4])]; };
-            for (std::size_t i = 0; i < 4; ++i) {
-                const Vec3d normal = cross(at(i + 1) - at(i), at(i + 2) - at(i));
-                least = std::min(least, std::abs(dot(normal, at(i + 3) - at(i))) / glm::length(normal));
-            }
-        }
-        EXPECT_GT(least, 1e-8) << hardCase.name;
-        EXPECT_LT(least, 1e-5) << hardCase.name;
+        for (std::int64_t e = 0; e < mesh.elementCount(); ++e)
+            least = std::min(least, aspectOf(cornersOf(mesh, e)));
+        const double named = std::pow(10.0, -std::stoi(hardCase.name.substr(digits + 2)));
+        EXPECT_GT(least, 0.01 * named) << hardCase.name;
+        EXPECT_LT(least, 10 * named) << hardCase.name;
+        ++checked;
     }
+    EXPECT_EQ(checked, 60) << "four kinds, three surroundings, five aspect ratios";
 }
 
 }  // namespace
