@@ -253,6 +253,7 @@ void invertEverySecond(TetMesh& mesh) {
 }
 
 void appendMesh(TetMesh& mesh, const TetMesh& other) {
+    TESSERA_CHECK(&mesh != &other, "a mesh can't be appended to itself");
     TESSERA_CHECK(mesh.fields.empty() && other.fields.empty(), "meshes are joined before they get fields");
     const auto first = std::int32_t(mesh.points.size());
     mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());

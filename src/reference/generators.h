@@ -59,7 +59,7 @@ TetMesh dustMesh(const Vec3d& centreWorld, double spread, double size, int count
 void addFlatElements(TetMesh& mesh);
 /// Swaps two nodes of every second element.
 void invertEverySecond(TetMesh& mesh);
-/// Appends the nodes and elements of another mesh; fields must not be there yet.
+/// Appends the nodes and elements of another mesh, which isn't the same object; fields must not be there yet.
 void appendMesh(TetMesh& mesh, const TetMesh& other);
 /// Moves every node: p -> turn(p) x scale + offset, turned by fixed irrational angles when isTurned.
 struct Placement {

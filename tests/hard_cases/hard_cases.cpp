@@ -186,7 +186,7 @@ void addTopologies(Gallery& gallery) {
     gallery.mesh("Overlapping", [] { return overlappingMesh(40, 41); });
     gallery.mesh("TwiceTheSame", [] {
         TetMesh mesh = boxMesh({.cells = {2, 2, 2}, .jitter = 0.2});
-        appendMesh(mesh, mesh);
+        appendMesh(mesh, TetMesh(mesh));
         return mesh;
     });
     gallery.row("disconnected parts", "two touch in a node, two nowhere");
