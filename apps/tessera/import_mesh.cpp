@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <utility>
 
 #include "base/error.h"
@@ -136,8 +134,8 @@ ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
     file.repairMs = timer.elapsedMs();
     if (file.mesh.tets.empty())
         throw InputError(fmt::format(
-            "{}: the repair leaves nothing of {} elements, all of an aspect ratio below {:g} (those of zero "
-            "volume always go)",
+            "{}: --repair leaves nothing of {} elements, all of an aspect ratio below {:g}: a smaller "
+            "--repair-aspect or --repair-max-volume-loss keeps those whose volume isn't zero",
             path, file.repair->elementsBefore, options->limits.minAspect));
     return file;
 }
