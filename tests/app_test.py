@@ -16,6 +16,8 @@ import tempfile
 import time
 import unittest
 
+from signal_handlers import catches
+
 TESSERA = ""
 DATA = pathlib.Path()
 
@@ -400,16 +402,6 @@ class Interruption(AppTest):
         self.assertIsNone(process.poll(), "the run ended before it could be interrupted")
         process.send_signal(signal.SIGINT)
         self.finish(process, 130)
-
-
-def catches(pid, number):
-    """Whether the process has a handler for a signal."""
-    try:
-        status = pathlib.Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
-    mask = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:")), "0")
-    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 def list_quietly(folder):

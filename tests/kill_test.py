@@ -24,6 +24,8 @@ import sys
 import tempfile
 import time
 
+from signal_handlers import catches
+
 LONGEST_S = 120
 OLD = b"an older file\n" * 40
 
@@ -61,16 +63,6 @@ def commands(data, folder):
         Command("verify", ["verify", stokes, sampled, "--json", "out.json"], ["out.json"]),
         Command("info", ["info", sampled, "--json", "out.json"], ["out.json"]),
     ]  # fmt: skip
-
-
-def catches(pid, number):
-    """Whether the process has a handler for a signal: before main runs it has none, and a signal simply ends it."""
-    try:
-        status = pathlib.Path(f"/proc/{pid}/status").read_text()
-    except OSError:
-        return False
-    mask = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:")), "0")
-    return bool(int(mask, 16) >> (number - 1) & 1)
 
 
 class KillTest:
