@@ -1,7 +1,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <unistd.h>
 
 #include <bit>
@@ -12,6 +11,7 @@
 #include <iterator>
 #include <limits>
 
+#include "io/openvdb_grids.h"
 #include "io/vdb_file.h"
 
 namespace tessera {

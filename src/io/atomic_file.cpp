@@ -120,6 +120,9 @@ void AtomicFile::writeAt(std::int64_t offset, const void* bytes, std::size_t cou
             if (errno == EINTR) continue;
             fail(path_, reason(errno));
         }
+        // The disk starts now, which shortens the wait for it in the end.
+        if (std::size_t(written) >= kBufferBytes / 2)
+            ::sync_file_range(descriptor_, off_t(offset), off_t(written), SYNC_FILE_RANGE_WRITE);
         next += written;
         offset += written;
         count -= std::size_t(written);

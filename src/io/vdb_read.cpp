@@ -1,5 +1,4 @@
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +16,7 @@
 
 #include "base/error.h"
 #include "io/file_digest.h"
+#include "io/openvdb_grids.h"
 #include "io/vdb_metadata.h"
 
 namespace tessera {
@@ -139,7 +139,8 @@ template <class Grid>
 typename Grid::Ptr readTypedGrid(openvdb::io::File& file, const std::string& name) {
     if (!file.hasGrid(name)) throw InputError("there is no grid " + name);
     const typename Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
-    if (!grid) throw InputError("grid " + name + " is not a " + Grid::gridType());
+    if (!grid)
+        throw InputError("grid " + name + " holds other values than its name and the file's description say");
     return grid;
 }
 

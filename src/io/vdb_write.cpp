@@ -1,5 +1,4 @@
 #include <openvdb/io/Archive.h>
-#include <openvdb/openvdb.h>
 
 #include <unistd.h>
 
@@ -8,13 +7,14 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <mutex>
+#include <map>
 #include <ostream>
 
 #include "base/error.h"
 #include "io/atomic_file.h"
 #include "io/file_digest.h"
 #include "io/flat_tiles.h"
+#include "io/packed_grid.h"
 #include "io/vdb_metadata.h"
 
 namespace tessera {
@@ -64,29 +64,16 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
     return math::Transform::Ptr(new math::Transform(math::MapBase::Ptr(new math::AffineMap(matrix))));
 }
 
-// Active bits of a tile where all given channels are finite, and the largest magnitude there.
-struct FiniteMask {
-    std::array<std::uint64_t, 8> words{};
-    float largest = 0;
-};
-
-FiniteMask finiteMask(const OutputTile& tile, int firstChannel, int components) {
-    FiniteMask mask;
-    mask.words = tile.active;
+// Active bits of a tile where all given channels are finite.
+std::array<std::uint64_t, 8> finiteMask(const OutputTile& tile, int firstChannel, int components) {
+    std::array<std::uint64_t, 8> mask = tile.active;
     for (int c = firstChannel; c < firstChannel + components; ++c) {
         const float* values = tile.channel(c);
         for (std::size_t w = 0; w < 8; ++w) {
             std::uint64_t finite = 0;
             for (std::size_t b = 0; b < 64; ++b)
                 finite |= std::uint64_t(std::isfinite(values[w * 64 + b])) << b;
-            mask.words[w] &= finite;
-        }
-    }
-    for (int c = firstChannel; c < firstChannel + components; ++c) {
-        const float* values = tile.channel(c);
-        for (std::size_t i = 0; i < kTilePoints; ++i) {
-            if (mask.words[i >> 6] >> (i & 63) & 1)
-                mask.largest = std::max(mask.largest, std::abs(values[i]));
+            mask[w] &= finite;
         }
     }
     return mask;
@@ -98,134 +85,165 @@ void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
         leaf.getValueMask().template getWord<openvdb::Index64>(w) = words[w];
 }
 
+// A point outside the mesh that gets a value.
+struct ExtendedPoint {
+    openvdb::Coord index;
+    const float* values;  // of all channels
+};
+
+// The points outside the mesh that lie on one grid's lattice, by tile.
+class ExtendedTiles {
+  public:
+    // In the flat layout a finer level's points count where they are points of the grid too.
+    ExtendedTiles(const ExtensionPoints* extension, VdbLayout layout, int level) {
+        if (!extension) return;
+        for (const ExtensionPoint& point : extension->points) {
+            const int shift = level - point.level;
+            if (shift < 0 || (shift > 0 && layout == VdbLayout::levels)) continue;
+            const int mask = (1 << shift) - 1;
+            if ((point.index.x & mask) || (point.index.y & mask) || (point.index.z & mask)) continue;
+            const openvdb::Coord index(point.index.x >> shift, point.index.y >> shift,
+                                       point.index.z >> shift);
+            tiles_[index & ~(kTileSize - 1)].push_back({index, extension->values.data() + point.firstValue});
+        }
+    }
+    // Gives the points of a tile away.
+    std::vector<ExtendedPoint> take(const Vec3i& origin) {
+        const auto found = tiles_.find(coord(origin));
+        if (found == tiles_.end()) return {};
+        std::vector<ExtendedPoint> points = std::move(found->second);
+        tiles_.erase(found);
+        return points;
+    }
+    // Tiles that nobody took, without a point of the mesh.
+    std::vector<OutputTile> rest(int channels) const {
+        std::vector<OutputTile> tiles;
+        for (const auto& [origin, points] : tiles_) {
+            OutputTile& tile = tiles.emplace_back();
+            tile.origin = {origin.x(), origin.y(), origin.z()};
+            tile.owned = std::make_unique<float[]>(std::size_t(channels) * kTilePoints);
+            tile.values = tile.owned.get();
+        }
+        return tiles;
+    }
+
+  private:
+    std::map<openvdb::Coord, std::vector<ExtendedPoint>> tiles_;
+};
+
 // The grid of one plan at one level, or the coverage mask.
 class GridBuilder {
   public:
     virtual ~GridBuilder() = default;
-    /// Makes the leaf nodes of a batch; may be called for several tiles at once.
-    virtual void makeLeaf(std::size_t position, const OutputTile& tile) = 0;
     virtual void reserve(std::size_t tiles) = 0;
-    /// Puts the leaf nodes made since into the tree.
+    // Makes and compresses the leaf node of a tile of a batch; may be called for several at once.
+    virtual void makeLeaf(std::size_t position, const OutputTile& tile,
+                          const std::vector<ExtendedPoint>& extended) = 0;
+    // Puts the leaf nodes made since into the tree.
     virtual void addLeaves() = 0;
-    virtual void extend(const ExtensionPoints&, const std::vector<std::pair<Vec3i, std::uint32_t>>&) {}
     virtual openvdb::GridBase::Ptr grid() const = 0;
-    virtual float largest() const { return 0; }
+    // Adds what depends on all leaf nodes. Once, when they are complete.
+    virtual void describe() = 0;
 };
 
 template <class Grid>
 class BuilderOf : public GridBuilder {
   public:
     using Leaf = typename Grid::TreeType::LeafNodeType;
-    explicit BuilderOf(const typename Grid::ValueType& background) : grid_(Grid::create(background)) {}
+    BuilderOf(const typename Grid::ValueType& background, bool toHalf)
+        : grid_(std::make_shared<PackedGrid<Grid>>(background)) {
+        grid_->setSaveFloatAsHalf(toHalf);
+    }
 
-    void reserve(std::size_t tiles) override {
-        leaves_.resize(tiles);
-        largest_.assign(tiles, 0.0f);
+    void reserve(std::size_t tiles) override { made_.resize(tiles); }
+    void makeLeaf(std::size_t position, const OutputTile& tile,
+                  const std::vector<ExtendedPoint>& extended) override {
+        Leaf leaf(coord(tile.origin), grid_->background());
+        fill(leaf, tile, extended);
+        if (leaf.isEmpty()) return;
+        auto maskOnly = std::make_unique<Leaf>(openvdb::PartialCreate(), leaf.origin(), grid_->background());
+        maskOnly->setValueMask(leaf.getValueMask());
+        made_[position] = {std::move(maskOnly),
+                           PackedLeaf(leaf, grid_->background(), grid_->saveFloatAsHalf())};
     }
     void addLeaves() override {
-        typename Grid::Accessor accessor = grid_->getAccessor();
-        for (std::unique_ptr<Leaf>& leaf : leaves_) {
-            if (leaf) accessor.addLeaf(leaf.release());
+        for (auto& [maskOnly, bytes] : made_) {
+            if (maskOnly) grid_->add(std::move(maskOnly), std::move(bytes));
         }
-        for (float value : largest_) largestOfAll_ = std::max(largestOfAll_, value);
     }
     openvdb::GridBase::Ptr grid() const override { return grid_; }
-    float largest() const override { return largestOfAll_; }
+    void describe() override { grid_->describe(); }
 
   protected:
-    typename Grid::Ptr grid_;
-    std::vector<std::unique_ptr<Leaf>> leaves_;
-    std::vector<float> largest_;
-    float largestOfAll_ = 0;
-};
+    virtual void fill(Leaf& leaf, const OutputTile& tile,
+                      const std::vector<ExtendedPoint>& extended) const = 0;
 
-bool empty(const std::array<std::uint64_t, 8>& words) {
-    return std::all_of(words.begin(), words.end(), [](std::uint64_t word) { return word == 0; });
-}
+  private:
+    std::shared_ptr<PackedGrid<Grid>> grid_;
+    std::vector<std::pair<std::unique_ptr<Leaf>, PackedLeaf>> made_;
+};
 
 class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
   public:
-    ScalarBuilder(int channel, float background)
-        : BuilderOf(background), channel_(channel), background_(background) {}
-
-    void makeLeaf(std::size_t position, const OutputTile& tile) override {
-        const FiniteMask mask = finiteMask(tile, channel_, 1);
-        if (empty(mask.words)) return;
-        auto leaf = std::make_unique<FloatLeaf>(coord(tile.origin), background_);
-        float* values = leaf->buffer().data();
-        std::memcpy(values, tile.channel(channel_), kTilePoints * sizeof(float));
-        for (std::size_t i = 0; i < kTilePoints; ++i) {
-            if (!(mask.words[i >> 6] >> (i & 63) & 1)) values[i] = background_;
-        }
-        setMask(*leaf, mask.words);
-        leaves_[position] = std::move(leaf);
-        largest_[position] = mask.largest;
-    }
-    void extend(const ExtensionPoints& extension,
-                const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
-        openvdb::FloatGrid::Accessor accessor = grid_->getAccessor();
-        for (const auto& [index, first] : points) {
-            const float value = extension.values[first + std::size_t(channel_)];
-            if (!std::isfinite(value) || accessor.isValueOn(coord(index))) continue;
-            accessor.setValueOn(coord(index), value);
-            largestOfAll_ = std::max(largestOfAll_, std::abs(value));
-        }
-    }
+    ScalarBuilder(int channel, float background, bool toHalf)
+        : BuilderOf(background, toHalf), channel_(channel), background_(background) {}
 
   private:
+    void fill(FloatLeaf& leaf, const OutputTile& tile,
+              const std::vector<ExtendedPoint>& extended) const override {
+        const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 1);
+        float* values = leaf.buffer().data();
+        std::memcpy(values, tile.channel(channel_), kTilePoints * sizeof(float));
+        for (std::size_t i = 0; i < kTilePoints; ++i) {
+            if (!(mask[i >> 6] >> (i & 63) & 1)) values[i] = background_;
+        }
+        setMask(leaf, mask);
+        for (const ExtendedPoint& point : extended) {
+            const float value = point.values[channel_];
+            if (std::isfinite(value) && !leaf.isValueOn(point.index)) leaf.setValueOn(point.index, value);
+        }
+    }
+
     int channel_;
     float background_;
 };
 
 class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
   public:
-    VectorBuilder(int channel, float background, UpAxis upAxis)
-        : BuilderOf(openvdb::Vec3f(background)),
-          channel_(channel),
-          background_(background),
-          upAxis_(upAxis) {}
+    VectorBuilder(int channel, float background, bool toHalf, UpAxis upAxis)
+        : BuilderOf(openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
 
-    void makeLeaf(std::size_t position, const OutputTile& tile) override {
-        const FiniteMask mask = finiteMask(tile, channel_, 3);
-        if (empty(mask.words)) return;
-        auto leaf = std::make_unique<Vec3fLeaf>(coord(tile.origin), openvdb::Vec3f(background_));
-        openvdb::Vec3f* values = leaf->buffer().data();
+  private:
+    void fill(Vec3fLeaf& leaf, const OutputTile& tile,
+              const std::vector<ExtendedPoint>& extended) const override {
+        const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 3);
+        openvdb::Vec3f* values = leaf.buffer().data();
         const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1),
                     *z = tile.channel(channel_ + 2);
         for (std::size_t i = 0; i < kTilePoints; ++i) {
-            if (mask.words[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
+            if (mask[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
         }
-        setMask(*leaf, mask.words);
-        leaves_[position] = std::move(leaf);
-        largest_[position] = mask.largest;
-    }
-    void extend(const ExtensionPoints& extension,
-                const std::vector<std::pair<Vec3i, std::uint32_t>>& points) override {
-        openvdb::Vec3SGrid::Accessor accessor = grid_->getAccessor();
-        for (const auto& [index, first] : points) {
-            const float* v = extension.values.data() + first + channel_;
+        setMask(leaf, mask);
+        for (const ExtendedPoint& point : extended) {
+            const float* v = point.values + channel_;
             if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2])) continue;
-            if (accessor.isValueOn(coord(index))) continue;
-            accessor.setValueOn(coord(index), turned({v[0], v[1], v[2]}, upAxis_));
-            for (int c = 0; c < 3; ++c) largestOfAll_ = std::max(largestOfAll_, std::abs(v[c]));
+            if (leaf.isValueOn(point.index)) continue;
+            leaf.setValueOn(point.index, turned({v[0], v[1], v[2]}, upAxis_));
         }
     }
 
-  private:
     int channel_;
-    float background_;
     UpAxis upAxis_;
 };
 
 class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
   public:
-    CoverageBuilder() : BuilderOf(false) {}
-    void makeLeaf(std::size_t position, const OutputTile& tile) override {
-        if (empty(tile.coverage)) return;
-        auto leaf = std::make_unique<BoolLeaf>(coord(tile.origin), false);
-        setMask(*leaf, tile.coverage);
-        leaf->buffer() = BoolLeaf::Buffer(leaf->getValueMask());
-        leaves_[position] = std::move(leaf);
+    CoverageBuilder() : BuilderOf(false, false) {}
+
+  private:
+    void fill(BoolLeaf& leaf, const OutputTile& tile, const std::vector<ExtendedPoint>&) const override {
+        setMask(leaf, tile.coverage);
+        leaf.buffer() = BoolLeaf::Buffer(leaf.getValueMask());
     }
 };
 
@@ -235,52 +253,39 @@ struct LevelGrids {
     std::vector<std::unique_ptr<GridBuilder>> builders;  // one a plan, then the coverage
 };
 
-LevelGrids makeBuilders(const std::vector<GridPlan>& plans, int level, const VdbWriteOptions& options) {
+LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf, int level,
+                        const VdbWriteOptions& options) {
     LevelGrids grids;
     grids.level = level;
-    for (const GridPlan& plan : plans) {
-        if (plan.components == 3) {
-            grids.builders.push_back(
-                std::make_unique<VectorBuilder>(plan.firstChannel, options.background, options.upAxis));
+    for (std::size_t p = 0; p < plans.size(); ++p) {
+        if (plans[p].components == 3) {
+            grids.builders.push_back(std::make_unique<VectorBuilder>(
+                plans[p].firstChannel, options.background, toHalf[p], options.upAxis));
         } else {
-            grids.builders.push_back(std::make_unique<ScalarBuilder>(plan.firstChannel, options.background));
+            grids.builders.push_back(
+                std::make_unique<ScalarBuilder>(plans[p].firstChannel, options.background, toHalf[p]));
         }
     }
     grids.builders.push_back(std::make_unique<CoverageBuilder>());
     return grids;
 }
 
-void addTiles(LevelGrids& grids, std::span<const OutputTile> tiles, const Execution& execution) {
+void addTiles(LevelGrids& grids, std::span<const OutputTile> tiles,
+              const std::vector<std::vector<ExtendedPoint>>& extended, const Execution& execution) {
     for (auto& builder : grids.builders) builder->reserve(tiles.size());
     parallelForChunks(execution, std::int64_t(tiles.size()), 64, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t i = begin; i < end; ++i) {
-            for (auto& builder : grids.builders) builder->makeLeaf(std::size_t(i), tiles[std::size_t(i)]);
+        for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
+            for (auto& builder : grids.builders) builder->makeLeaf(i, tiles[i], extended[i]);
         }
     });
     parallelFor(execution, std::int64_t(grids.builders.size()),
                 [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
 }
 
-// Extension points that lie on the grid's lattice. In the flat layout a finer level's points count where they
-// are points of the grid too.
-std::vector<std::pair<Vec3i, std::uint32_t>> pointsOnGrid(const ExtensionPoints& extension, VdbLayout layout,
-                                                          int level) {
-    std::vector<std::pair<Vec3i, std::uint32_t>> points;
-    for (const ExtensionPoint& point : extension.points) {
-        const int shift = level - point.level;
-        if (shift < 0 || (shift > 0 && layout == VdbLayout::levels)) continue;
-        const int mask = (1 << shift) - 1;
-        if ((point.index.x & mask) || (point.index.y & mask) || (point.index.z & mask)) continue;
-        points.emplace_back(Vec3i(point.index.x >> shift, point.index.y >> shift, point.index.z >> shift),
-                            point.firstValue);
-    }
-    return points;
-}
-
-std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResult& result,
-                                   const ExtensionPoints* extension, const Reconstruction* reconstruction,
-                                   const VdbWriteOptions& options, int flatLevel,
-                                   const Execution& execution) {
+std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf,
+                                   BrickResult& result, const ExtensionPoints* extension,
+                                   const Reconstruction* reconstruction, const VdbWriteOptions& options,
+                                   int flatLevel, const Execution& execution) {
     const bool flat = options.layout == VdbLayout::flat;
     std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
     for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
@@ -288,27 +293,65 @@ std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, BrickResu
     for (int level = 0; level < (flat ? 1 : result.tree.levelCount()); ++level) {
         if (!flat && !present[std::size_t(level)]) continue;
         const int gridLevel = flat ? flatLevel : level;
-        LevelGrids& grids = all.emplace_back(makeBuilders(plans, gridLevel, options));
+        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, gridLevel, options));
+        ExtendedTiles outside(extension, options.layout, gridLevel);
         const TileBatchSink sink = [&](std::span<const OutputTile> tiles) {
             execution.throwIfCancelled();
-            addTiles(grids, tiles, execution);
+            std::vector<std::vector<ExtendedPoint>> extended;
+            for (const OutputTile& tile : tiles) extended.push_back(outside.take(tile.origin));
+            addTiles(grids, tiles, extended, execution);
         };
         if (flat) {
             forEachFlatTile(result.tree, result.store, reconstruction, extension, gridLevel, execution, sink);
         } else {
             forEachLevelTile(result.tree, result.store, level, execution, sink);
         }
-        if (!extension) continue;
-        const auto points = pointsOnGrid(*extension, options.layout, gridLevel);
-        parallelFor(execution, std::int64_t(grids.builders.size()),
-                    [&](std::int64_t b) { grids.builders[std::size_t(b)]->extend(*extension, points); });
+        sink(outside.rest(result.store.channels()));
     }
     return all;
+}
+
+// The largest magnitude of some channels, in the mesh and beside it.
+float largestMagnitude(const BrickStore& store, const ExtensionPoints* extension, const GridPlan& plan) {
+    float largest = 0;
+    const auto take = [&](float value) {
+        if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+    };
+    for (int c = plan.firstChannel; c < plan.firstChannel + plan.components; ++c) {
+        for (std::size_t leaf = 0; leaf < store.leafCount(); ++leaf) {
+            for (int t = 0; t < store.tileCount(); ++t) {
+                const Tile* tile = store.tile(leaf, t);
+                for (int i = 0; tile && i < kTilePoints; ++i) {
+                    if (tile->covered(i)) take(tile->channel(c)[i]);
+                }
+            }
+        }
+        if (!extension) continue;
+        for (const ExtensionPoint& point : extension->points)
+            take(extension->values[point.firstValue + std::size_t(c)]);
+    }
+    return largest;
 }
 
 // Half floats end at 65504 and lose digits below 6.1e-5.
 bool fitsHalf(float largest) {
     return largest == 0 || (largest <= 65504.0f && largest >= 6.2e-5f);
+}
+
+// Which plans are written in half floats: those asked for that fit.
+std::vector<bool> choosePrecision(const std::vector<GridPlan>& plans, const BrickStore& store,
+                                  const ExtensionPoints* extension, const VdbWriteOptions& options,
+                                  VdbWriteResult& result) {
+    std::vector<bool> toHalf(plans.size(), false);
+    for (std::size_t p = 0; options.halfFloat && p < plans.size(); ++p) {
+        const float largest = largestMagnitude(store, extension, plans[p]);
+        toHalf[p] = fitsHalf(largest);
+        if (toHalf[p]) continue;
+        result.notes.push_back(
+            "grid " + plans[p].name + " is written in full floats: its largest magnitude " +
+            exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
+    }
+    return toHalf;
 }
 
 void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickTree& tree, int level,
@@ -322,47 +365,59 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
 
 // Grids in the order of the file: field by field, each with its finest level first, then the coverage.
 openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
-                                 const BrickTree& tree, const VdbWriteOptions& options,
-                                 VdbWriteResult& result) {
+                                 const BrickTree& tree, const VdbWriteOptions& options, double unitScale) {
     openvdb::GridCPtrVec ordered;
     for (std::size_t p = 0; p <= plans.size(); ++p) {
         const bool coverage = p == plans.size();
-        float largest = 0;
-        for (const LevelGrids& grids : levels) largest = std::max(largest, grids.builders[p]->largest());
-        const bool half = !coverage && options.halfFloat && fitsHalf(largest);
-        if (!coverage && options.halfFloat && !half) {
-            result.notes.push_back(
-                "grid " + plans[p].name + " is written in full floats: its largest magnitude " +
-                exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
-        }
         for (const LevelGrids& grids : levels) {
             openvdb::GridBase& grid = *grids.builders[p]->grid();
             const std::string base = coverage ? "coverage" : plans[p].name;
-            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level,
-                         result.unitScale, options.upAxis);
+            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
+                         options.upAxis);
             grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
-            grid.setSaveFloatAsHalf(half);
             if (!coverage)
                 grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME
                                                            : openvdb::GRID_UNKNOWN);
             if (!coverage && plans[p].components == 3)
                 grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+            grids.builders[p]->describe();
             ordered.push_back(grids.builders[p]->grid());
         }
     }
     return ordered;
 }
 
-// OpenVDB's own File hides failed writes, so grids go through a stream of ours.
+// OpenVDB's File hides failed writes, and its Archive compresses all leaf nodes to learn their sizes before
+// it compresses them to be written. This one writes to a stream of ours what grids bring.
 class StreamArchive : public openvdb::io::Archive {
   public:
-    StreamArchive() {
-        setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-        setInstancingEnabled(false);
-    }
+    StreamArchive() { setCompression(kVdbCompression); }
     void writeTo(std::ostream& stream, const openvdb::GridCPtrVec& grids,
                  const openvdb::MetaMap& metadata) const {
-        Archive::write(stream, grids, true, metadata);
+        writeHeader(stream, true);
+        metadata.writeMeta(stream);
+        const auto count = openvdb::Int32(grids.size());
+        stream.write(reinterpret_cast<const char*>(&count), sizeof count);
+        for (const openvdb::GridBase::ConstPtr& grid : grids) writeGrid(stream, *grid);
+    }
+
+  private:
+    void writeGrid(std::ostream& stream, const openvdb::GridBase& grid) const {
+        openvdb::io::GridDescriptor place(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+        place.writeHeader(stream);
+        const std::streampos placesAt = stream.tellp();
+        place.writeStreamPos(stream);
+        place.setGridPos(stream.tellp());
+        setGridCompression(stream, grid);
+        grid.writeMeta(stream);
+        grid.writeTransform(stream);
+        grid.writeTopology(stream);
+        place.setBlockPos(stream.tellp());
+        grid.writeBuffers(stream);
+        place.setEndPos(stream.tellp());
+        stream.seekp(placesAt);
+        place.writeStreamPos(stream);
+        place.seekToEnd(stream);
     }
 };
 
@@ -520,9 +575,10 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
     for (const GridPlan& plan : plans)
         TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
                       "a field's channels are in the store");
-    std::vector<LevelGrids> levels =
-        buildGrids(plans, result, extension, reconstruction, options, written.flatLevel, execution);
-    const openvdb::GridCPtrVec grids = finishGrids(levels, plans, result.tree, options, written);
+    const std::vector<bool> toHalf = choosePrecision(plans, result.store, extension, options, written);
+    const std::vector<LevelGrids> levels =
+        buildGrids(plans, toHalf, result, extension, reconstruction, options, written.flatLevel, execution);
+    const openvdb::GridCPtrVec grids = finishGrids(levels, plans, result.tree, options, written.unitScale);
     for (const openvdb::GridBase::ConstPtr& grid : grids)
         written.activeVoxels += std::int64_t(grid->activeVoxelCount());
     writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written)), execution);
