@@ -1,5 +1,8 @@
 #include "io/vdb_file.h"
 
+#include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
+
 #include "base/error.h"
 #include "vdb_case.h"
 
@@ -357,6 +360,30 @@ float smallIntegers(int level, const Vec3i& p, int channel) {
 }
 float pressures(int, const Vec3i& p, int) {
     return 101325.0f + float(p.x);
+}
+
+// Leaf nodes are compressed by code of ours: OpenVDB, given the grids it reads from the file, writes the same
+// bytes but for the digest, with statistics and the table for delayed loading.
+TEST_F(VdbFileTest, OpenVdbWritesTheSameBytes) {
+    for (const bool toHalf : {false, true}) {
+        BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10);
+        ExtensionPoints outside;
+        outside.points = {{{-200, 3, 5}, 0, 0}, {{-1, -1, 0}, 2, 10}};
+        outside.values.assign(20, 1.5f);
+        VdbWriteOptions options;
+        options.halfFloat = toHalf;
+        options.background = 0.25f;
+        writeVdb(file("ours.vdb"), kMixed, result, &outside, nullptr, options, {});
+        std::ifstream stream(file("ours.vdb"), std::ios::binary);
+        openvdb::io::Stream ours(stream, false);  // keeps the grids' order
+        openvdb::io::File theirs(file("theirs.vdb"));
+        theirs.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+        theirs.write(*ours.getGrids(), *ours.getMetadata());
+        theirs.close();
+        const auto withoutUuid = [&](const std::string& name) { return readBytes(file(name)).erase(21, 36); };
+        EXPECT_EQ(withoutUuid("ours.vdb").size(), withoutUuid("theirs.vdb").size());
+        EXPECT_TRUE(withoutUuid("ours.vdb") == withoutUuid("theirs.vdb"));
+    }
 }
 
 TEST_F(VdbFileTest, HalfFloatsReadBack) {
