@@ -25,7 +25,7 @@ namespace {
 using tessera::bench::medianOf;
 
 struct Options {
-    std::string meshPath, csvPath, program = TESSERA_PROGRAM;
+    std::string meshPath, csvPath, program = TESSERA_PROGRAM, reader = TESSERA_READER;
     int runs = 9, threads = 0;
 };
 
@@ -96,7 +96,7 @@ std::string report(const Options& options, const Pair& pair) {
 void compare(const Options& options) {
     tessera::Execution execution;
     execution.threads = options.threads;
-    const tessera::IsolatedReader reader{options.program, {"read-mesh"}};
+    const tessera::IsolatedReader reader{options.program, {"read-mesh"}, 0, options.reader};
     Pair library{"library", {}, {}}, program{"command line", {}, {}};
     for (int r = -1; r < options.runs; ++r) {  // the first round warms the file cache
         const Sample samples[] = {
@@ -125,6 +125,8 @@ int main(int argc, char** argv) {
     Options options;
     app.add_option("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py")->required();
     app.add_option("--program", options.program, "the tessera program");
+    app.add_option("--reader", options.reader,
+                   "the program that the library starts; empty: the tessera program");
     app.add_option("--csv", options.csvPath, "also write the figures here");
     app.add_option("--runs", options.runs)->check(CLI::Range(1, 1000));
     app.add_option("--threads", options.threads)->check(CLI::Range(0, 1024));

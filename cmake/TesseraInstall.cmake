@@ -11,6 +11,7 @@ foreach(layer IN LISTS layers)
 endforeach()
 if(TARGET tessera)
   install(TARGETS tessera RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS tessera_read_mesh EXPORT TesseraTargets RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/tessera)
 endif()
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

@@ -32,6 +32,11 @@ IsolatedReader childThat(const std::string& mode) {
     return {TESSERA_MISBEHAVING_READER, {mode}};
 }
 
+/// The program for common formats first; the other one goes wrong when it is told to.
+IsolatedReader quickReader(const std::string& modeOfTheOther) {
+    return {TESSERA_MISBEHAVING_READER, {modeOfTheOther}, 0, TESSERA_QUICK_READER};
+}
+
 VtuText twoTets() {
     VtuText vtu;
     vtu.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
@@ -222,7 +227,9 @@ TEST_F(IsolatedReaderTest, TheMeshIsThatInProcessBitForBit) {
         TESSERA_DATA_DIR "/freefem-stokes-sphere/stokes_p1.vtu"};
     for (const std::string& path : paths) {
         SCOPED_TRACE(path);
-        expectEqual(readMeshIsolated(childThat("read"), path, {}, {}, {}), readMesh(path, {}, {}));
+        const MeshFile inProcess = readMesh(path, {}, {});
+        expectEqual(readMeshIsolated(childThat("read"), path, {}, {}, {}), inProcess);
+        expectEqual(readMeshIsolated(quickReader("crash"), path, {}, {}, {}), inProcess);
     }
     expectEqual(readMeshIsolated(childThat("read"), path_, {{"f"}, -1}, {}, {}),
                 readMesh(path_, {{"f"}, -1}, {}));
@@ -243,11 +250,34 @@ TEST_F(IsolatedReaderTest, OtherFormatsAreTheSameToo) {
                 continue;
             }
             expectEqual(readMeshIsolated(childThat("read"), entry.path(), {}, {}, {}), inProcess);
+            expectEqual(readMeshIsolated(quickReader("read"), entry.path(), {}, {}, {}), inProcess);
             ++formats;
             break;
         }
     }
     EXPECT_GT(formats, 0);
+}
+
+TEST_F(IsolatedReaderTest, TheQuickProgramLeavesOtherFormatsToTheOther) {
+    const std::string path = folder_.write("run.case", "FORMAT\ntype: ensight gold\n");
+    EXPECT_THROW(readCommonMesh(path, {}, {}), OtherFormatError);
+    const auto refusalBy = [&](const std::string& mode) -> std::string {
+        try {
+            readMeshIsolated(quickReader(mode), path, {}, {}, {});
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_PRED2(has, refusalBy("crash"), "crashed (signal 11");
+    EXPECT_PRED2(has, refusalBy("read"), "run.case");
+    EXPECT_FALSE(has(refusalBy("read"), "only VTK XML"));
+}
+
+TEST_F(IsolatedReaderTest, AQuickProgramIsFoundBesideTessera) {
+    const auto place = std::filesystem::path(TESSERA_QUICK_READER).parent_path();
+    EXPECT_EQ(quickReaderBeside(place / "nothing"), "");
+    EXPECT_EQ(quickReaderBeside(TESSERA_QUICK_READER), std::filesystem::canonical(TESSERA_QUICK_READER));
 }
 
 TEST_F(IsolatedReaderTest, ALimitOnFileSizesLeavesThePipe) {

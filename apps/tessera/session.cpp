@@ -36,7 +36,9 @@ Session::Session(const CommonOptions& options)
 
 MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
     if (!isolated_) return tessera::readMesh(path, options, execution);
-    return readMeshIsolated({"/proc/self/exe", {kReadMeshCommand}, threadsAtStart}, path, options, limits_,
+    static const std::string self = "/proc/self/exe";
+    static const std::string quick = quickReaderBeside(self);
+    return readMeshIsolated({self, {kReadMeshCommand}, threadsAtStart, quick}, path, options, limits_,
                             execution);
 }
 

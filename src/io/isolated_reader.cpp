@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <new>
 
 #include "base/error.h"
@@ -49,8 +48,8 @@ class IsolatedReading {
     MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
 
   private:
-    std::unique_ptr<ReaderProcess> startProcess(const IsolatedReader& reader,
-                                                const ReadOptions& options) const;
+    ReportStart awaitAnswer(ReaderProcess& process);
+    MeshFile takeMesh(ReaderProcess& process, const ReportStart& answer);
     void awaitReport(ReaderProcess& process);
     bool receive(int descriptor);
     bool isComplete() const;
@@ -126,6 +125,7 @@ void IsolatedReading::awaitReport(ReaderProcess& process) {
 void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message) const {
     switch (outcome) {
         case ReaderOutcome::inputError:
+        case ReaderOutcome::otherFormat:
             throw InputError(message);
         case ReaderOutcome::ioError:
             throw IoError(message);
@@ -144,30 +144,40 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
     }
 }
 
-std::unique_ptr<ReaderProcess> IsolatedReading::startProcess(const IsolatedReader& reader,
-                                                             const ReadOptions& options) const {
-    const std::vector<std::string> request =
-        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
-    if (reader.threadsAtStart > 0 && threadCount() == reader.threadsAtStart)
-        return std::make_unique<ReaderProcess>([&] { return serveMeshReader(request); });
-    std::vector<std::string> words = reader.arguments;
-    words.insert(words.end(), request.begin(), request.end());
-    return std::make_unique<ReaderProcess>(reader.executable, words);
+ReportStart IsolatedReading::awaitAnswer(ReaderProcess& process) {
+    report_.clear();
+    awaitReport(process);
+    return start();
 }
 
-MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
-    const std::unique_ptr<ReaderProcess> process = startProcess(reader, options);
-    awaitReport(*process);
-    const ReportStart s = start();
-    const std::span<const std::byte> rest = std::span(report_).subspan(sizeof s);
+MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& answer) {
+    const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
     try {
-        if (s.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
-        if (s.outcome == ReaderOutcome::meshInMemory)
-            return readPacket(SealedMemory(process->mesh()).bytes(), execution_);
+        if (answer.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
+        if (answer.outcome == ReaderOutcome::meshInMemory)
+            return readPacket(SealedMemory(process.mesh()).bytes(), execution_);
     } catch (const DamagedPacket& damage) {
         failWithGarbage(damage.what());
     }
-    rethrow(s.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
+    rethrow(answer.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
+}
+
+MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
+    const std::vector<std::string> request =
+        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
+    if (reader.threadsAtStart > 0 && threadCount() == reader.threadsAtStart) {
+        ReaderProcess copy([&] { return serveMeshReader(request); });
+        return takeMesh(copy, awaitAnswer(copy));
+    }
+    if (!reader.quickExecutable.empty()) {
+        ReaderProcess quick(reader.quickExecutable, request);
+        const ReportStart answer = awaitAnswer(quick);
+        if (answer.outcome != ReaderOutcome::otherFormat) return takeMesh(quick, answer);
+    }
+    std::vector<std::string> words = reader.arguments;
+    words.insert(words.end(), request.begin(), request.end());
+    ReaderProcess process(reader.executable, words);
+    return takeMesh(process, awaitAnswer(process));
 }
 
 }  // namespace
@@ -176,6 +186,17 @@ int threadCount() {
     std::error_code error;
     const std::filesystem::directory_iterator threads("/proc/self/task", error);
     return error ? 0 : int(std::distance(begin(threads), end(threads)));
+}
+
+std::string quickReaderBeside(const std::string& executable) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    const fs::path directory = fs::canonical(executable, error).parent_path();
+    for (const char* place : {"", TESSERA_READER_FROM_BINDIR}) {
+        const fs::path candidate = directory / place / "tessera_read_mesh";
+        if (!error && ::access(candidate.c_str(), X_OK) == 0) return candidate.string();
+    }
+    return {};
 }
 
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,

@@ -1,15 +1,11 @@
 #include "io/read_vtk.h"
 
 #include <vtkAlgorithm.h>
-#include <vtkCGNSReader.h>
 #include <vtkDataArraySelection.h>
 #include <vtkDataObject.h>
 #include <vtkDataSetReader.h>
-#include <vtkExodusIIReader.h>
-#include <vtkGenericEnSightReader.h>
 #include <vtkInformation.h>
 #include <vtkNew.h>
-#include <vtkOpenFOAMReader.h>
 #include <vtkSmartPointer.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 #include <vtkXMLImageDataReader.h>
@@ -25,9 +21,9 @@
 #include <new>
 
 #include "base/error.h"
-#include "io/open_check.h"
 #include "io/vtk_convert.h"
 #include "io/vtk_messages.h"
+#include "io/vtk_source.h"
 #include "io/xml_check.h"
 
 namespace tessera {
@@ -57,12 +53,6 @@ const XmlReaderKind kXmlReaders[] = {
     {"vtkMultiBlockDataSet", "VTK XML multi-block", makeXmlReader<vtkXMLMultiBlockDataReader>},
 };
 
-/// A reader ready to run, and what it reads.
-struct OpenReader {
-    vtkSmartPointer<vtkAlgorithm> reader;
-    std::string format;
-};
-
 /// Leaves out arrays that nobody asked for. Their names stay known, for messages.
 void selectArrays(vtkDataArraySelection* selection, FieldLocation location, const ReadOptions& options,
                   std::vector<ArrayInfo>& unread) {
@@ -75,7 +65,7 @@ void selectArrays(vtkDataArraySelection* selection, FieldLocation location, cons
     }
 }
 
-OpenReader openXml(const std::string& path, const DeclaredSize& info) {
+VtkSource openXml(const std::string& path, const DeclaredSize& info) {
     for (const XmlReaderKind& kind : kXmlReaders) {
         if (info.type != kind.type) continue;
         auto reader = kind.make();
@@ -87,55 +77,7 @@ OpenReader openXml(const std::string& path, const DeclaredSize& info) {
         (info.type == "Collection" ? "; name one of its files, or resample the .pvd as a series" : ""));
 }
 
-OpenReader openExodus(const std::string& path) {
-    auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
-    reader->SetFileName(path.c_str());
-    // Coordinates as they are in the file, and no bookkeeping arrays.
-    reader->ApplyDisplacementsOff();
-    reader->GenerateObjectIdCellArrayOff();
-    reader->GenerateGlobalElementIdArrayOff();
-    reader->GenerateGlobalNodeIdArrayOff();
-    reader->UpdateInformation();
-    reader->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
-    reader->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
-    return {reader, "Exodus II"};
-}
-
-OpenReader openCgns(const std::string& path) {
-    auto reader = vtkSmartPointer<vtkCGNSReader>::New();
-    reader->SetFileName(path.c_str());
-    reader->SetDoublePrecisionMesh(1);
-    reader->SetLoadBndPatch(false);
-    reader->UpdateInformation();
-    reader->EnableAllBases();
-    reader->EnableAllFamilies();
-    reader->EnableAllPointArrays();
-    reader->EnableAllCellArrays();
-    return {reader, "CGNS"};
-}
-
-OpenReader openEnSight(const std::string& path) {
-    auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
-    reader->SetCaseFileName(path.c_str());
-    reader->ReadAllVariablesOn();
-    return {reader, "EnSight"};
-}
-
-OpenReader openFoam(const std::string& path) {
-    auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
-    reader->SetFileName(path.c_str());
-    reader->DecomposePolyhedraOff();
-    reader->CreateCellToPointOff();
-    reader->UpdateInformation();
-    reader->EnableAllCellArrays();
-    reader->EnableAllPointArrays();
-    reader->DisableAllLagrangianArrays();
-    reader->DisableAllPatchArrays();
-    reader->SetPatchArrayStatus("internalMesh", 1);
-    return {reader, "OpenFOAM"};
-}
-
-OpenReader openLegacy(const std::string& path) {
+VtkSource openLegacy(const std::string& path) {
     auto reader = vtkSmartPointer<vtkDataSetReader>::New();
     reader->SetFileName(path.c_str());
     reader->ReadAllScalarsOn();
@@ -146,24 +88,6 @@ OpenReader openLegacy(const std::string& path) {
     reader->ReadAllTCoordsOn();
     reader->ReadAllFieldsOn();
     return {reader, "VTK legacy"};
-}
-
-OpenReader open(const std::string& path, VtkFormat format, const DeclaredSize& info) {
-    switch (format) {
-        case VtkFormat::xml:
-            return openXml(path, info);
-        case VtkFormat::legacy:
-            return openLegacy(path);
-        case VtkFormat::exodus:
-            return openExodus(path);
-        case VtkFormat::cgns:
-            return openCgns(path);
-        case VtkFormat::ensight:
-            return openEnSight(path);
-        case VtkFormat::openfoam:
-            break;
-    }
-    return openFoam(path);
 }
 
 /// Runs the reader for the time step that the options choose.
@@ -203,15 +127,15 @@ void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObjec
 }
 
 RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options,
-             const Execution& execution) {
+             const Execution& execution, OpenVtkFormat openOther) {
     RawMesh raw;
     DeclaredSize info;
     if (format == VtkFormat::xml) info = checkXmlFile(path);
     if (format == VtkFormat::legacy) checkLegacyFile(path);
-    if (format == VtkFormat::exodus) checkExodusFile(path);
-    if (format == VtkFormat::cgns) checkCgnsFile(path);
     const VtkMessages messages;
-    OpenReader opened = open(path, format, info);
+    VtkSource opened = format == VtkFormat::xml      ? openXml(path, info)
+                       : format == VtkFormat::legacy ? openLegacy(path)
+                                                     : openOther(path, format);
     std::vector<ArrayInfo> unread;
     if (auto* xml = vtkXMLReader::SafeDownCast(opened.reader)) {
         xml->UpdateInformation();
@@ -237,9 +161,11 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
 }  // namespace
 
 RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
-                const Execution& execution) {
+                const Execution& execution, OpenVtkFormat openOther) {
+    if (!openOther && format != VtkFormat::xml && format != VtkFormat::legacy)
+        throw OtherFormatError(path + ": only VTK XML, legacy VTK and TetGen files are read here");
     try {
-        return read(path, format, options, execution);
+        return read(path, format, options, execution, openOther);
     } catch (const std::bad_alloc&) {
         throw TooLargeError(path + ": damaged or too large: reading it asked for more memory than there is");
     } catch (const std::length_error&) {

@@ -47,6 +47,27 @@ sigset_t maskOfChild() {
     return blocked;
 }
 
+/// The environment of a started program: ours, and memory in large pages where the system has them on
+/// request, since a reader's time goes into first touches.
+class ReaderEnvironment {
+  public:
+    ReaderEnvironment() {
+        for (char** entry = environ; entry && *entry; ++entry) {
+            entries_.push_back(*entry);
+            if (std::strncmp(*entry, kTunables, std::strlen(kTunables)) == 0) tuned_ = true;
+        }
+        if (!tuned_) entries_.push_back(largePages_.data());
+        entries_.push_back(nullptr);
+    }
+    char** entries() { return entries_.data(); }
+
+  private:
+    static constexpr const char* kTunables = "GLIBC_TUNABLES=";
+    std::string largePages_ = std::string(kTunables) + "glibc.malloc.hugetlb=1";
+    bool tuned_ = false;  // by the user
+    std::vector<char*> entries_;
+};
+
 /// What posix_spawn does in the child.
 class SpawnPlan {
   public:
@@ -75,9 +96,10 @@ class SpawnPlan {
         std::vector<char*> words{const_cast<char*>(executable.c_str())};
         for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
         words.push_back(nullptr);
+        ReaderEnvironment environment;
         pid_t child = -1;
-        if (const int error =
-                posix_spawn(&child, executable.c_str(), &actions_, &attributes_, words.data(), environ))
+        if (const int error = posix_spawn(&child, executable.c_str(), &actions_, &attributes_, words.data(),
+                                          environment.entries()))
             failToStart(executable, error);
         return child;
     }

@@ -12,7 +12,9 @@ namespace tessera {
 enum class ReaderOutcome : std::uint32_t {
     meshInMemory,  ///< the mesh's packet is in the shared memory
     meshFollows,   ///< it follows in the pipe, where a limit on file sizes forbids the shared memory
-    inputError,    ///< a message follows, also for the ones below
+    otherFormat,   ///< the file has a format that this program doesn't read; a message follows, also for the
+                   ///< ones below
+    inputError,
     ioError,
     internalError,
     otherError,

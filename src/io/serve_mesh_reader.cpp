@@ -146,6 +146,8 @@ int serveMeshReader(std::span<const std::string> arguments, const MeshReader& re
         report(memoryRanOut, {});
     } catch (const std::bad_alloc&) {
         report(memoryRanOut, {});
+    } catch (const OtherFormatError& error) {
+        report(ReaderOutcome::otherFormat, error.what());
     } catch (const InputError& error) {
         report(ReaderOutcome::inputError, error.what());
     } catch (const IoError& error) {

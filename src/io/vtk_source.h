@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vtkAlgorithm.h>
+#include <vtkSmartPointer.h>
+
+#include <string>
+
+#include "io/read_vtk.h"
+
+namespace tessera {
+
+/// A reader ready to run, and what it reads.
+struct VtkSource {
+    vtkSmartPointer<vtkAlgorithm> reader;
+    std::string format;
+};
+
+}  // namespace tessera
