@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "io/input_file.h"
 #include "io/mesh_packet.h"
 #include "io/reader_report.h"
 #include "mesh_test_tools.h"
@@ -39,6 +41,10 @@ VtuText twoTets() {
     vtu.pointArrays.push_back({"f", "Float64", 1, "1 2 3 4 nan"});
     vtu.cellArrays.push_back({"f", "Int32", 1, "7 8"});
     return vtu;
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
 }
 
 std::size_t openDescriptors() {
@@ -373,6 +379,86 @@ TEST(DefaultLimits, GrowWithTheFilesAndStaySmallForSmallOnes) {
     EXPECT_NEAR(double(pair.memoryBytes) / (1 << 20), 640 + 96 * 4, 0.01);
     EXPECT_NEAR(pair.seconds, 6 + (4 << 20) * 0.25e-6, 1e-9);
     EXPECT_THROW(defaultLimits(folder.file("absent.vtu")), InputError);
+}
+
+TEST(DefaultLimits, CountAFileOnceHoweverOftenItIsNamed) {
+    const TemporaryFolder folder;
+    folder.write("piece.vtu", replaced(twoTets().text(), "</VTKFile>",
+                                       "<!--" + std::string(1 << 20, ' ') + "--></VTKFile>"));
+    const auto naming = [&](int times) {
+        std::string pieces;
+        for (int i = 0; i < times; ++i) pieces += "<Piece Source=\"piece.vtu\"/>";
+        return folder.write("all.pvtu", "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid>" + pieces +
+                                            "</PUnstructuredGrid></VTKFile>");
+    };
+    const IsolationLimits once = defaultLimits(naming(1)), often = defaultLimits(naming(2000));
+    EXPECT_GT(once.memoryBytes, (640 + 96) << 20);
+    EXPECT_LT(often.memoryBytes, once.memoryBytes + (8 << 20));
+}
+
+TEST(DefaultLimits, AFileThatIsCutOffMeanwhileIsAnError) {
+    const TemporaryFolder folder;
+    const std::string text =
+        replaced(twoTets().text(), "</VTKFile>", "<!--" + std::string(4 << 20, '-') + "--></VTKFile>");
+    const std::string path = folder.write("mesh.vtu", text);
+    std::atomic<bool> end{false};
+    std::thread cutter([&] {
+        while (!end) {
+            std::filesystem::resize_file(path, 100);
+            std::filesystem::resize_file(path, text.size());
+        }
+    });
+    for (int i = 0; i < 300; ++i) EXPECT_THROW(defaultLimits(path), InputError);
+    end = true;
+    cutter.join();
+}
+
+TEST(DefaultLimits, PipesAndDevicesAreRefusedAtOnce) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(::mkfifo(folder.file("pipe").c_str(), 0600), 0);
+    const auto refuse = [](const std::string& path) {
+        std::string message = "(it was taken)";
+        try {
+            defaultLimits(path);
+        } catch (const InputError& error) {
+            message = error.what();
+        }
+        EXPECT_NE(message.find("isn't a regular file"), std::string::npos) << message;
+    };
+    const std::string head = "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: ";
+    refuse(folder.file("pipe"));
+    refuse(folder.write("a.case", head + "pipe\n"));
+    refuse(folder.write("b.case", head + "1 pip*\n"));
+    refuse(folder.write("c.case", head + "/dev/zero\r\n"));
+    refuse(folder.write("d.pvtu",
+                        "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"pipe\"/>"
+                        "</PUnstructuredGrid></VTKFile>"));
+    folder.write("mesh.geo", "x");
+    EXPECT_NO_THROW(defaultLimits(folder.write("e.case", head + "mesh.geo\n")));
+}
+
+TEST(InputFile, FindsWhatATextFinds) {
+    const TemporaryFolder folder;
+    std::string text;
+    for (int i = 0; i < 90000; ++i) text += std::to_string(i) + (i % 7 == 0 ? " <" : ">>");
+    InputFile file(folder.write("text", text));
+    ASSERT_EQ(file.size(), text.size());
+    for (std::size_t from = 0; from < text.size(); from += 1777) {
+        for (const std::string word : {"8888>>", "<", "89999", "absent"})
+            EXPECT_EQ(file.find(word, from), text.find(word, from));
+        EXPECT_EQ(file.findFirstOf("< ", from), text.find_first_of("< ", from));
+        EXPECT_EQ(file.findFirstNotOf("<>0123456789", from), text.find_first_not_of("<>0123456789", from));
+        EXPECT_EQ(file.bytesFrom(from, 10).substr(0, 10), text.substr(from, 10));
+        EXPECT_EQ(file.copy(from, 300000), text.substr(from, 300000));
+    }
+    for (const std::string word : {"0 <", ">>1", "100>>", "absent"})
+        EXPECT_EQ(file.rfind(word), text.rfind(word));
+    std::filesystem::resize_file(file.path(), 400000);
+    EXPECT_THROW(file.find("absent", 0), InputError);
+    EXPECT_THROW(file.rfind("absent"), InputError);
+    EXPECT_EQ(file.bytesFrom(5, 10).substr(0, 10), text.substr(5, 10));
+    EXPECT_THROW(file.copy(0, text.size()), InputError);
+    EXPECT_THROW(readWholeFile(folder.file("absent")), InputError);
 }
 
 TEST(MeshPacket, EveryDamagedByteIsRefusedOrHarmless) {

@@ -25,6 +25,7 @@
 #include <new>
 
 #include "base/error.h"
+#include "io/ensight_check.h"
 #include "io/open_check.h"
 #include "io/vtk_convert.h"
 #include "io/vtk_messages.h"
@@ -210,6 +211,7 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     if (format == VtkFormat::legacy) checkLegacyFile(path);
     if (format == VtkFormat::exodus) checkExodusFile(path);
     if (format == VtkFormat::cgns) checkCgnsFile(path);
+    if (format == VtkFormat::ensight) checkEnSightCase(path);
     const VtkMessages messages;
     OpenReader opened = open(path, format, info);
     std::vector<ArrayInfo> unread;
