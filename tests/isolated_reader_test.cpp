@@ -145,6 +145,40 @@ TEST_F(IsolatedReaderTest, AHangEndsAtTheTimeLimit) {
     EXPECT_PRED2(has, refusal("hang", {kAmple.memoryBytes, 0.5}), "more than 0.5 s");
 }
 
+TEST_F(IsolatedReaderTest, TheLimitOnProcessorTimeLetsTheReaderWait) {
+    const IsolationLimits limits{kAmple.memoryBytes, 60, 0.4};
+    EXPECT_PRED2(has, refusal("spin", limits), "more than 0.4 s of processor time");
+    EXPECT_EQ(refusal("nap", limits), path_ + ": awake");
+}
+
+TEST_F(IsolatedReaderTest, ALimitOnTimeThatIsGivenIsTheOnlyOne) {
+    EXPECT_PRED2(has, refusal("spin", {kAmple.memoryBytes, 0.5}),
+                 "more than 0.5 s, the limit given; for a file like this it would be 6 s of processor time");
+    EXPECT_PRED2(has, refusal("nap", {kAmple.memoryBytes, 0.3}), "more than 0.3 s, the limit given");
+}
+
+TEST_F(IsolatedReaderTest, ThreadsAreWithinTheMemoryLimit) {
+    const auto tell = [&](const std::string& mode, std::int64_t mebibytes, int threads) {
+        Execution execution;
+        execution.threads = threads;
+        try {
+            readMeshIsolated(childThat(mode), path_, {}, {mebibytes << 20, 60}, execution);
+        } catch (const InputError& told) {
+            return std::stoi(told.what());
+        }
+        return -1;
+    };
+    EXPECT_EQ(tell("threads", 1024, 3), 3);
+    EXPECT_EQ(tell("threads", 40, 64), 1);
+    EXPECT_LE(tell("threads", 1024, 64) * 9 * 8, 1024);
+#ifndef __SANITIZE_ADDRESS__
+    for (const int threads : {1, 64}) {
+        EXPECT_LE(tell("count-memory", 200, threads), 200);
+        EXPECT_GE(tell("count-memory", 200, threads), 150);
+    }
+#endif
+}
+
 TEST_F(IsolatedReaderTest, EndlessAllocationEndsAtTheMemoryLimit) {
 #ifdef __SANITIZE_ADDRESS__
     GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
@@ -372,12 +406,14 @@ TEST(DefaultLimits, GrowWithTheFilesAndStaySmallForSmallOnes) {
     const std::string small = folder.write("small.vtu", twoTets().text());
     const IsolationLimits limits = defaultLimits(small);
     EXPECT_LT(limits.memoryBytes, std::int64_t(1) << 30);
-    EXPECT_LT(limits.seconds, 8);
+    EXPECT_LT(limits.processorSeconds, 8);
+    EXPECT_NEAR(limits.seconds, 60, 0.1);
     folder.write("piece.node", std::string(1 << 20, ' '));
     folder.write("piece.ele", std::string(3 << 20, ' '));
     const IsolationLimits pair = defaultLimits(folder.file("piece.ele"));
     EXPECT_NEAR(double(pair.memoryBytes) / (1 << 20), 640 + 96 * 4, 0.01);
-    EXPECT_NEAR(pair.seconds, 6 + (4 << 20) * 0.25e-6, 1e-9);
+    EXPECT_NEAR(pair.processorSeconds, 6 + (4 << 20) * 0.25e-6, 1e-9);
+    EXPECT_NEAR(pair.seconds, 10 * pair.processorSeconds, 1e-9);
     EXPECT_THROW(defaultLimits(folder.file("absent.vtu")), InputError);
 }
 

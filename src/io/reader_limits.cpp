@@ -18,6 +18,8 @@ namespace {
 // better.
 constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytesPerItem = 700;
 constexpr double kFloorSeconds = 6, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
+// Others may have the processors, and disks may be slow.
+constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
 // Below, a file's own word on its cells is worth nothing: its size alone bounds what it may take.
 constexpr std::int64_t kSmallFile = 8 << 20;
 constexpr int kMostFiles = 100000;
@@ -73,11 +75,15 @@ InputSize sizeOfInput(const std::string& path) {
 
 IsolationLimits defaultLimits(const std::string& path) {
     const InputSize size = sizeOfInput(path);
+    IsolationLimits limits;
     double bytes = kFloorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items);
     const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
     if (pages > 0 && pageBytes > 0) bytes = std::min(bytes, 0.75 * double(pages) * double(pageBytes));
-    return {std::int64_t(bytes),
-            kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items)};
+    limits.memoryBytes = std::int64_t(bytes);
+    limits.processorSeconds =
+        kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
+    limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
+    return limits;
 }
 
 }  // namespace tessera
