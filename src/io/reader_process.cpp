@@ -27,17 +27,24 @@ namespace tessera {
 namespace {
 
 constexpr int kFirstSpare = 10;  // above every descriptor that the child gets
+constexpr int kFewestFiles = 32;
 constexpr int kEndMs = 2000;
 constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
 
 [[noreturn]] void failToStart(const std::string& what, int error) {
-    throw IoError("can't start the process that reads meshes: " + what + ": " + std::strerror(error));
+    std::string line = "can't start the process that reads meshes: " + what + ": " + std::strerror(error);
+    rlimit files{};
+    if (error == EMFILE && ::getrlimit(RLIMIT_NOFILE, &files) == 0)
+        line += ": at most " + std::to_string(files.rlim_cur) + " are allowed here (ulimit -n), " +
+                std::to_string(kFewestFiles) + " will do";
+    throw IoError(line);
 }
 
 /// A copy that no dup2 in the child overwrites.
 Descriptor spareCopy(const Descriptor& descriptor) {
     const int copy = ::fcntl(descriptor.get(), F_DUPFD_CLOEXEC, kFirstSpare);
-    if (copy < 0) failToStart("descriptor", errno);
+    // Numbers from kFirstSpare on may all be forbidden.
+    if (copy < 0) failToStart("descriptor", errno == EINVAL ? EMFILE : errno);
     return Descriptor(copy);
 }
 
