@@ -316,13 +316,26 @@ class Repair(AppTest):
         self.assertGreater(sum(repair["kept"].values()), 0)
         self.assertLess(abs(repair["volume"][1] / repair["volume"][0] - 1), 1.001e-6)
 
+    def test_every_command_that_repairs_warns(self):
+        options = ["--repair", "--repair-aspect", "0.5"]
+        self.run_tessera("resample", self.thin, "-o", "out.vdb", "--refine", "uniform", "--resolution", "20", *options)
+        for command in (
+            ["info", self.thin, *options], ["tets", self.thin, "-o", "tets.vtu", *options], ["verify", self.thin, "out.vdb"],
+            ["picture", "out.vdb", "-o", "slice.png", "--mesh", self.thin],
+        ):  # fmt: skip
+            with self.subTest(command=command[0]):
+                result = self.run_tessera(*command)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertRegex(result.stderr, r"warning: .*thin.vtu: \d+ degenerate elements stay")
+
     def test_a_repair_that_leaves_nothing_is_an_error(self):
         self.write("needle.vtu", vtu_text([(0, 0, 0), (1e-9, 0, 0), (0, 1e-9, 0), (0, 0, 1)], [(0, 1, 2, 3)]))
         self.reject(2, "needle.vtu --repair-aspect", "info", "needle.vtu", "--repair", "--repair-max-volume-loss", "100%")
 
     def test_options_out_of_range(self):
         self.reject(2, "--repair-aspect", "info", self.thin, "--repair-aspect", "1e-3")
-        self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "0")
+        line = self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "0")
+        self.assertIn("expected 1e-12 to 0.5, got '0'", line)
         self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "thin")
         self.reject(2, "--repair-max-volume-loss", "info", self.thin, "--repair", "--repair-max-volume-loss", "2")
 

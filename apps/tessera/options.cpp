@@ -269,6 +269,23 @@ void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
         ->group(group);
 }
 
+void refuseReaderBounds(const ReaderArguments& a, const std::string& why) {
+    require(!a.maxSeconds, "--max-read-time bounds the reading of a mesh: " + why);
+    require(a.maxMemory.empty(), "--max-memory bounds the reading of a mesh here: " + why);
+}
+
+CLI::Validator numbersWithin(double first, double last) {
+    const auto check = [first, last](std::string& text) {
+        double value = 0;
+        const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool isNumber = failure == std::errc{} && end == text.data() + text.size();
+        return isNumber && value >= first && value <= last
+                   ? std::string()
+                   : fmt::format("expected {:g} to {:g}, got '{}'", first, last, text);
+    };
+    return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
+}
+
 BindOptions bindOptions(const AlgorithmArguments& a) {
     BindOptions options;
     options.target = a.gl;

@@ -82,6 +82,13 @@ void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& arguments);
 void addBindOptions(CLI::App& command, AlgorithmArguments& arguments);
 void addResampleOptions(CLI::App& command, ResampleArguments& arguments);
 
+/// For commands that were given no mesh to read: throws InputError when there are bounds on reading one.
+/// @param why "out.vdb is no mesh".
+void refuseReaderBounds(const ReaderArguments& arguments, const std::string& why);
+
+/// Numbers from `first` to `last`; says so in plain figures.
+CLI::Validator numbersWithin(double first, double last);
+
 BindOptions bindOptions(const AlgorithmArguments& arguments);
 /// The format's name when it isn't r32f, which loses nothing; else empty.
 std::string lossyFormat(const BindOptions& options);
