@@ -174,6 +174,8 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
 int runPicture(const PictureArguments& arguments) {
     checkOutputPaths({arguments.input, arguments.mesh},
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
+    if (arguments.mesh.empty())
+        refuseReaderBounds(arguments.common.reader, "without --mesh there is none to be read");
     Session session(arguments.common);
     checkWritable(arguments.output);
     const VdbFile file = readVdb(arguments.input);

@@ -52,6 +52,7 @@ void requirePositive(const std::string& option, double value) {
 
 void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     const std::string group = "Where to sample how finely";
+    a.common.reader.memoryBoundsRun = true;
     command
         .add_option(
             "--refine", a.refine,
@@ -98,8 +99,10 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
                     "bound on stored voxels, e.g. 500M (default: from the memory there is)")
         ->group(group);
     command
-        .add_option("--max-memory", a.common.reader.maxMemory,
-                    "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G")
+        .add_option(
+            "--max-memory", a.common.reader.maxMemory,
+            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G; with "
+            "--reader in-process reading itself has no bound")
         ->group(group);
     command
         .add_flag("--dry-run", a.dryRun,
@@ -214,13 +217,17 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
         ->capture_default_str()
         ->group(group);
     command
-        .add_option("--max-read-time", a.maxSeconds,
-                    "seconds that reading may take (default: 6, and more for files above 8 MB)")
+        .add_option(
+            "--max-read-time", a.maxSeconds,
+            "seconds that reading may take (default: 6 of processor time and 60 until the end, and more "
+            "for large files); not with --reader in-process")
         ->group(group);
     if (!command.get_option_no_throw("--max-memory"))
         command
-            .add_option("--max-memory", a.maxMemory,
-                        "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size)")
+            .add_option(
+                "--max-memory", a.maxMemory,
+                "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size); not "
+                "with --reader in-process")
             ->group(group);
 }
 

@@ -17,6 +17,7 @@ namespace tessera {
 struct ReaderArguments {
     std::string kind = "isolated", maxMemory;  ///< maxMemory: empty for a bound from the file's size
     std::optional<double> maxSeconds;
+    bool memoryBoundsRun = false;  ///< the command keeps to maxMemory after reading too
 };
 
 /// Options of every subcommand.
