@@ -316,13 +316,26 @@ class Repair(AppTest):
         self.assertGreater(sum(repair["kept"].values()), 0)
         self.assertLess(abs(repair["volume"][1] / repair["volume"][0] - 1), 1.001e-6)
 
+    def test_every_command_that_repairs_warns(self):
+        options = ["--repair", "--repair-aspect", "0.5"]
+        self.run_tessera("resample", self.thin, "-o", "out.vdb", "--refine", "uniform", "--resolution", "20", *options)
+        for command in (
+            ["info", self.thin, *options], ["tets", self.thin, "-o", "tets.vtu", *options], ["verify", self.thin, "out.vdb"],
+            ["picture", "out.vdb", "-o", "slice.png", "--mesh", self.thin],
+        ):  # fmt: skip
+            with self.subTest(command=command[0]):
+                result = self.run_tessera(*command)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                self.assertRegex(result.stderr, r"warning: .*thin.vtu: \d+ degenerate elements stay")
+
     def test_a_repair_that_leaves_nothing_is_an_error(self):
         self.write("needle.vtu", vtu_text([(0, 0, 0), (1e-9, 0, 0), (0, 1e-9, 0), (0, 0, 1)], [(0, 1, 2, 3)]))
         self.reject(2, "needle.vtu --repair-aspect", "info", "needle.vtu", "--repair", "--repair-max-volume-loss", "100%")
 
     def test_options_out_of_range(self):
         self.reject(2, "--repair-aspect", "info", self.thin, "--repair-aspect", "1e-3")
-        self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "0")
+        line = self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "0")
+        self.assertIn("expected 1e-12 to 0.5, got '0'", line)
         self.reject(2, "--repair-aspect", "info", self.thin, "--repair", "--repair-aspect", "thin")
         self.reject(2, "--repair-max-volume-loss", "info", self.thin, "--repair", "--repair-max-volume-loss", "2")
 
@@ -357,6 +370,38 @@ class FailingOutputs(AppTest):
         self.write("out.vdb", "old")
         self.reject(2, "", "resample", "nothing.vtu", "-o", "out.vdb")
         self.assertEqual((self.folder / "out.vdb").read_text(), "old")
+
+    def test_standard_output_that_takes_nothing(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        for command in (
+            ["info", self.cube], ["info", "cube.vdb"], ["info", self.cube, "--json", "-"], ["verify", self.cube, "cube.vdb"],
+            ["slice", self.cube, "-o", "cut.exr", "--resolution", "8"], ["tets", self.cube, "-o", "tets.vtu"],
+            ["resample", self.cube, "-o", "out.vdb"], ["picture", "cube.vdb", "-o", "slice.png"],
+            ["compare", self.cube, "--algorithms", "software", "--resolution", "8", "--runs", "1"], ["--help"], ["info", "--help"], ["--version"],
+        ):  # fmt: skip
+            for words, options in (("No space left", {"stdout": "/dev/full"}), ("Bad file", {"stdout": None})):
+                with self.subTest(command=command, **options):
+                    result = self.run_with_output(options["stdout"], *command)
+                    self.assertEqual(result.returncode, 1, result.stderr)
+                    self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+                    self.assertIn("tessera: standard output", result.stderr)
+                    self.assertIn(words, result.stderr)
+        self.assertEqual(self.run_with_output("/dev/full", "info", self.cube, "--quiet").returncode, 0)
+
+    def run_with_output(self, path, *arguments):
+        """A run whose standard output is this file, or closed for None."""
+        with open(path or os.devnull, "w") as output:
+            prepare = None if path else (lambda: os.close(1))
+            return subprocess.run([TESSERA, *map(str, arguments)], stdout=output, stderr=subprocess.PIPE, text=True, timeout=300, cwd=self.folder,
+                                  preexec_fn=prepare)  # fmt: skip
+
+    def test_closed_streams_leave_files_whole(self):
+        arguments = [TESSERA, "resample", self.stokes, "-o", "out.vdb"]
+        subprocess.run([*map(str, arguments), "--quiet"], check=True, cwd=self.folder)
+        whole = (self.folder / "out.vdb").read_bytes()
+        result = subprocess.run([*map(str, arguments)], cwd=self.folder, preexec_fn=lambda: os.closerange(0, 3))
+        self.assertEqual(result.returncode, 1)
+        self.assertEqual((self.folder / "out.vdb").read_bytes(), whole)
 
     def test_out_of_memory(self):
         def limit():
@@ -894,6 +939,40 @@ class Reader(AppTest):
             self.reject(2, "--max-read-time", "info", self.cube, f"--max-read-time={value}")
         self.reject(2, "--reader", "info", self.cube, "--reader", "psychic")
         self.reject(2, "--max-memory", "info", self.cube, "--max-memory", "lots")
+
+    def test_bounds_that_would_be_without_effect_are_refused(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        self.reject(2, "--max-read-time in-process", "info", self.cube, "--reader", "in-process", "--max-read-time", "5")
+        self.reject(2, "--max-memory in-process", "info", self.cube, "--reader", "in-process", "--max-memory", "1G")
+        self.reject(2, "--max-read-time cube.vdb", "info", "cube.vdb", "--max-read-time", "5")
+        self.reject(2, "--max-memory cube.vdb", "info", "cube.vdb", "--max-memory", "1G")
+        self.reject(2, "--max-read-time --mesh", "picture", "cube.vdb", "-o", "cube.png", "--max-read-time", "5")
+        self.succeed("picture", "cube.vdb", "-o", "cube.png", "--max-read-time", "50", "--mesh", self.cube)
+        self.succeed("resample", self.cube, "-o", "out.vdb", "--reader", "in-process", "--max-memory", "1G")
+        self.reject(2, "--max-memory", "resample", self.cube, "-o", "more.vdb", "--reader", "in-process", "--max-memory", "10M")
+
+    def test_few_open_files_are_enough_or_one_line(self):
+        codes = set()
+        for files in range(6, 33):
+            def limit():
+                resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
+
+            result = self.run_tessera("info", self.cube, preexec_fn=limit)
+            codes.add(result.returncode)
+            self.assertIn(result.returncode, (0, 1), f"{files} files: {result.stderr}")
+            if result.returncode == 1:
+                self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+                self.assertRegex(result.stderr, "open files.*ulimit -n")
+        self.assertEqual(codes, {0, 1})
+
+    def test_reads_without_proc(self):
+        hide = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /proc && exec "$@"', "sh"]
+        if os.geteuid() != 0 or subprocess.run([*hide, "true"], capture_output=True).returncode:
+            self.skipTest("hiding /proc needs root")
+        expected = self.succeed("info", self.stokes)
+        for program in (TESSERA, os.path.relpath(TESSERA, self.folder)):
+            result = subprocess.run([*hide, program, "info", self.stokes], capture_output=True, text=True, cwd=self.folder)
+            self.assertEqual((result.returncode, result.stdout, result.stderr), (0, expected, ""))
 
     def test_the_readers_own_command_is_hidden_and_useless_by_hand(self):
         self.assertNotIn("read-mesh", self.succeed("--help"))

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "io/input_file.h"
 #include "io/mesh_packet.h"
 #include "io/reader_report.h"
 #include "mesh_test_tools.h"
@@ -44,6 +46,10 @@ VtuText twoTets() {
     vtu.pointArrays.push_back({"f", "Float64", 1, "1 2 3 4 nan"});
     vtu.cellArrays.push_back({"f", "Int32", 1, "7 8"});
     return vtu;
+}
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+    return text.replace(text.find(from), from.size(), to);
 }
 
 std::size_t openDescriptors() {
@@ -142,6 +148,40 @@ TEST_F(IsolatedReaderTest, AnEndWithoutAResultNamesTheExitCode) {
 
 TEST_F(IsolatedReaderTest, AHangEndsAtTheTimeLimit) {
     EXPECT_PRED2(has, refusal("hang", {kAmple.memoryBytes, 0.5}), "more than 0.5 s");
+}
+
+TEST_F(IsolatedReaderTest, TheLimitOnProcessorTimeLetsTheReaderWait) {
+    const IsolationLimits limits{kAmple.memoryBytes, 60, 0.4};
+    EXPECT_PRED2(has, refusal("spin", limits), "more than 0.4 s of processor time");
+    EXPECT_EQ(refusal("nap", limits), path_ + ": awake");
+}
+
+TEST_F(IsolatedReaderTest, ALimitOnTimeThatIsGivenIsTheOnlyOne) {
+    EXPECT_PRED2(has, refusal("spin", {kAmple.memoryBytes, 0.5}),
+                 "more than 0.5 s, the limit given; for a file like this it would be 6 s of processor time");
+    EXPECT_PRED2(has, refusal("nap", {kAmple.memoryBytes, 0.3}), "more than 0.3 s, the limit given");
+}
+
+TEST_F(IsolatedReaderTest, ThreadsAreWithinTheMemoryLimit) {
+    const auto tell = [&](const std::string& mode, std::int64_t mebibytes, int threads) {
+        Execution execution;
+        execution.threads = threads;
+        try {
+            readMeshIsolated(childThat(mode), path_, {}, {mebibytes << 20, 60}, execution);
+        } catch (const InputError& told) {
+            return std::stoi(told.what());
+        }
+        return -1;
+    };
+    EXPECT_EQ(tell("threads", 1024, 3), 3);
+    EXPECT_EQ(tell("threads", 40, 64), 1);
+    EXPECT_LE(tell("threads", 1024, 64) * 9 * 8, 1024);
+#ifndef __SANITIZE_ADDRESS__
+    for (const int threads : {1, 64}) {
+        EXPECT_LE(tell("count-memory", 200, threads), 200);
+        EXPECT_GE(tell("count-memory", 200, threads), 150);
+    }
+#endif
 }
 
 TEST_F(IsolatedReaderTest, EndlessAllocationEndsAtTheMemoryLimit) {
@@ -396,13 +436,95 @@ TEST(DefaultLimits, GrowWithTheFilesAndStaySmallForSmallOnes) {
     const std::string small = folder.write("small.vtu", twoTets().text());
     const IsolationLimits limits = defaultLimits(small);
     EXPECT_LT(limits.memoryBytes, std::int64_t(1) << 30);
-    EXPECT_LT(limits.seconds, 8);
+    EXPECT_LT(limits.processorSeconds, 8);
+    EXPECT_NEAR(limits.seconds, 60, 0.1);
     folder.write("piece.node", std::string(1 << 20, ' '));
     folder.write("piece.ele", std::string(3 << 20, ' '));
     const IsolationLimits pair = defaultLimits(folder.file("piece.ele"));
     EXPECT_NEAR(double(pair.memoryBytes) / (1 << 20), 640 + 96 * 4, 0.01);
-    EXPECT_NEAR(pair.seconds, 6 + (4 << 20) * 0.25e-6, 1e-9);
+    EXPECT_NEAR(pair.processorSeconds, 6 + (4 << 20) * 0.25e-6, 1e-9);
+    EXPECT_NEAR(pair.seconds, 10 * pair.processorSeconds, 1e-9);
     EXPECT_THROW(defaultLimits(folder.file("absent.vtu")), InputError);
+}
+
+TEST(DefaultLimits, CountAFileOnceHoweverOftenItIsNamed) {
+    const TemporaryFolder folder;
+    folder.write("piece.vtu", replaced(twoTets().text(), "</VTKFile>",
+                                       "<!--" + std::string(1 << 20, ' ') + "--></VTKFile>"));
+    const auto naming = [&](int times) {
+        std::string pieces;
+        for (int i = 0; i < times; ++i) pieces += "<Piece Source=\"piece.vtu\"/>";
+        return folder.write("all.pvtu", "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid>" + pieces +
+                                            "</PUnstructuredGrid></VTKFile>");
+    };
+    const IsolationLimits once = defaultLimits(naming(1)), often = defaultLimits(naming(2000));
+    EXPECT_GT(once.memoryBytes, (640 + 96) << 20);
+    EXPECT_LT(often.memoryBytes, once.memoryBytes + (8 << 20));
+}
+
+TEST(DefaultLimits, AFileThatIsCutOffMeanwhileIsAnError) {
+    const TemporaryFolder folder;
+    const std::string text =
+        replaced(twoTets().text(), "</VTKFile>", "<!--" + std::string(4 << 20, '-') + "--></VTKFile>");
+    const std::string path = folder.write("mesh.vtu", text);
+    std::atomic<bool> end{false};
+    std::thread cutter([&] {
+        while (!end) {
+            std::filesystem::resize_file(path, 100);
+            std::filesystem::resize_file(path, text.size());
+        }
+    });
+    for (int i = 0; i < 300; ++i) EXPECT_THROW(defaultLimits(path), InputError);
+    end = true;
+    cutter.join();
+}
+
+TEST(DefaultLimits, PipesAndDevicesAreRefusedAtOnce) {
+    const TemporaryFolder folder;
+    ASSERT_EQ(::mkfifo(folder.file("pipe").c_str(), 0600), 0);
+    const auto refuse = [](const std::string& path) {
+        std::string message = "(it was taken)";
+        try {
+            defaultLimits(path);
+        } catch (const InputError& error) {
+            message = error.what();
+        }
+        EXPECT_NE(message.find("isn't a regular file"), std::string::npos) << message;
+    };
+    const std::string head = "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: ";
+    refuse(folder.file("pipe"));
+    refuse(folder.write("a.case", head + "pipe\n"));
+    refuse(folder.write("b.case", head + "1 pip*\n"));
+    refuse(folder.write("c.case", head + "/dev/zero\r\n"));
+    refuse(folder.write("d.pvtu",
+                        "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"pipe\"/>"
+                        "</PUnstructuredGrid></VTKFile>"));
+    folder.write("mesh.geo", "x");
+    EXPECT_NO_THROW(defaultLimits(folder.write("e.case", head + "mesh.geo\n")));
+}
+
+TEST(InputFile, FindsWhatATextFinds) {
+    const TemporaryFolder folder;
+    std::string text;
+    for (int i = 0; i < 90000; ++i) text += std::to_string(i) + (i % 7 == 0 ? " <" : ">>");
+    InputFile file(folder.write("text", text));
+    ASSERT_EQ(file.size(), text.size());
+    for (std::size_t from = 0; from < text.size(); from += 1777) {
+        for (const std::string word : {"8888>>", "<", "89999", "absent"})
+            EXPECT_EQ(file.find(word, from), text.find(word, from));
+        EXPECT_EQ(file.findFirstOf("< ", from), text.find_first_of("< ", from));
+        EXPECT_EQ(file.findFirstNotOf("<>0123456789", from), text.find_first_not_of("<>0123456789", from));
+        EXPECT_EQ(file.bytesFrom(from, 10).substr(0, 10), text.substr(from, 10));
+        EXPECT_EQ(file.copy(from, 300000), text.substr(from, 300000));
+    }
+    for (const std::string word : {"0 <", ">>1", "100>>", "absent"})
+        EXPECT_EQ(file.rfind(word), text.rfind(word));
+    std::filesystem::resize_file(file.path(), 400000);
+    EXPECT_THROW(file.find("absent", 0), InputError);
+    EXPECT_THROW(file.rfind("absent"), InputError);
+    EXPECT_EQ(file.bytesFrom(5, 10).substr(0, 10), text.substr(5, 10));
+    EXPECT_THROW(file.copy(0, text.size()), InputError);
+    EXPECT_THROW(readWholeFile(folder.file("absent")), InputError);
 }
 
 TEST(MeshPacket, EveryDamagedByteIsRefusedOrHarmless) {

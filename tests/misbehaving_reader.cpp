@@ -6,6 +6,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,7 +14,9 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.h"
@@ -45,6 +48,17 @@ void claimMesh() {
     }
 }
 
+/// How many mebibytes there are to be had.
+int countMebibytes() {
+    std::vector<std::unique_ptr<char[]>> blocks;
+    blocks.reserve(1 << 12);
+    try {
+        while (blocks.size() < blocks.capacity()) blocks.push_back(std::make_unique<char[]>(1 << 20));
+    } catch (const std::bad_alloc&) {
+    }
+    return int(blocks.size());
+}
+
 /// Descriptors that are open beside the five a reader has.
 std::string otherDescriptors() {
     std::string list;
@@ -66,6 +80,20 @@ const std::map<std::string, std::function<tessera::MeshFile(const std::string& p
      [](const std::string& path) -> tessera::MeshFile {
          std::ofstream(path + ".pid") << getpid() << std::endl;
          while (true) pause();
+     }},
+    {"spin",
+     [](const std::string&) -> tessera::MeshFile {
+         volatile unsigned turns = 0;
+         while (true) turns = turns + 1;
+     }},
+    {"nap",
+     [](const std::string& path) -> tessera::MeshFile {
+         std::this_thread::sleep_for(std::chrono::milliseconds(800));
+         throw tessera::InputError(path + ": awake");
+     }},
+    {"count-memory",
+     [](const std::string&) -> tessera::MeshFile {
+         throw tessera::InputError(std::to_string(countMebibytes()));
      }},
     {"allocate", [](const std::string&) -> tessera::MeshFile { allocateForEver(); }},
     {"throw-input",
@@ -126,6 +154,12 @@ int main(int argc, char** argv) {
     }
     const std::vector<std::string> words(argv + 2, argv + argc);
     if (mode == "read") _exit(tessera::serveMeshReader(words));
+    if (mode == "threads")
+        _exit(tessera::serveMeshReader(words,
+                                       [](const std::string&, const tessera::ReadOptions&,
+                                          const tessera::Execution& execution) -> tessera::MeshFile {
+                                           throw tessera::InputError(std::to_string(execution.threads));
+                                       }));
     const auto reader = kReaders.find(mode);
     if (reader == kReaders.end()) return 95;
     _exit(tessera::serveMeshReader(words, [&](const std::string& path, const tessera::ReadOptions&,

@@ -265,6 +265,37 @@ TEST(DeclaredSize, LegacyLinesMustFitTheFile) {
            "X_COORDINATES 99999999");
 }
 
+TEST(DeclaredSize, LegacyWordsAreThoseOfVtksReader) {
+    const TemporaryFolder folder;
+    const std::string grid = "DATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0 1 0 0 0 1 0 0 0 1\n";
+    const std::string cells = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+    const auto elements = [&](const std::string& text) {
+        return readMesh(folder.write("l.vtk", "# vtk DataFile Version 3.0\n" + text), {}, {})
+            .mesh.elementCount();
+    };
+    EXPECT_EQ(elements("POINTS 999999999 float\nASCII\n" + grid + cells), 1);
+    EXPECT_EQ(elements("\n\n ascii\n" + grid + cells), 1);
+    EXPECT_EQ(elements("t\nASCII\ndataset unstructured_grid\npoints\t4\tdouble\n0 0 0 1 0 0 0 1 0 0 0 1 "
+                       "Cells 1\n5\n4 0 1 2 3\n\tcell_types 1\n10\n"),
+              1);
+    const auto refuse = [&](const std::string& text, const std::string& word) {
+        expectRefused(folder.write("l.vtk", "# vtk DataFile Version 3.0\n" + text), {word, "declares"});
+    };
+    refuse("t\nASCII\n" + replaced(grid, "POINTS 4", "points\t\t4000000"), "points");
+    refuse("t\nASCII\n" + replaced(grid, "POINTS 4", "Points\n4000000"), "Points");
+    refuse("t\nASCII\n" + grid + "\t" + replaced(cells, "CELLS 1 5", "cells 1\t500"), "cells 1");
+    refuse("t\nbinary\n" + replaced(grid, "POINTS 4", "POINTS +4000000"), "POINTS +4000000");
+}
+
+TEST(DeclaredSize, LegacyWordsAreFoundWhereverTheFileIsDivided) {
+    const TemporaryFolder folder;
+    const std::string head = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+    for (std::size_t at = (256 << 10) - 40; at < (256 << 10) + 3; ++at)
+        expectRefused(
+            folder.write("l.vtk", head + std::string(at - head.size(), ' ') + "POINTS 4000000 double\n"),
+            {"POINTS 4000000", "byte " + std::to_string(at)});
+}
+
 TEST(BadXml, NodeIndicesOutOfRangeAreNamed) {
     const TemporaryFolder folder;
     VtuText vtu = oneTet();

@@ -345,6 +345,20 @@ TEST(ReadPvtu, MergesPiecesAndLeavesOutGhosts) {
     EXPECT_EQ(field(file, "f").values, (std::vector<double>{1, 2, 3, 4, 5, 1, 2, 3, 4}));
 }
 
+TEST(ReadPvtu, PieceNamesMayHoldEntities) {
+    const TemporaryFolder folder;
+    for (const char* name : {"a&b <1>.vtu", "'it's\".vtu", "\u00fc\u20ac\U0001F600.vtu", "x.vtu&amp"})
+        folder.write(name, twoTets().text());
+    const std::string path = folder.write(
+        "all.pvtu",
+        "<VTKFile type=\"PUnstructuredGrid\" version=\"0.1\" byte_order=\"LittleEndian\"><PUnstructuredGrid>"
+        "<PPoints><PDataArray type=\"Float64\" NumberOfComponents=\"3\"/></PPoints>"
+        "<Piece Source=\"a&amp;b &lt;&#49;&gt;.vtu\"/><Piece Source=\"&apos;it's&quot;.vtu\"/>"
+        "<Piece Source=\"&#xfc;&#x20AC;&#128512;.vtu\"/><Piece Source=\"x.vtu&#38;amp\"/>"
+        "</PUnstructuredGrid></VTKFile>\n");
+    EXPECT_EQ(read(path).statistics.cells, 8);
+}
+
 TEST(ReadMultiBlock, MergesBlocksAndFillsAbsentFields) {
     const TemporaryFolder folder;
     VtuText a = twoTets(), b = twoTets();

@@ -33,6 +33,7 @@ Json gridsJson(const VdbFile& file) {
 
 /// Prints what the file holds, and gives the same as a document when one is wanted.
 Json showVdb(const InfoArguments& arguments, Session& session) {
+    refuseReaderBounds(arguments.common.reader, arguments.path + " is no mesh");
     const VdbFile file = readVdb(arguments.path);
     std::vector<std::vector<std::string>> rows{{"grid", "active voxels"}};
     for (std::size_t g = 0; g < file.gridNames.size(); ++g)

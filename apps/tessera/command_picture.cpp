@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "commands.h"
@@ -61,7 +62,7 @@ struct Outside {
     std::vector<int> fields;
 };
 
-Outside readOutside(const PictureArguments& arguments, const VdbFile& file, const Session& session) {
+Outside readOutside(const PictureArguments& arguments, const VdbFile& file, Session& session) {
     Outside outside;
     if (arguments.mesh.empty()) {
         for (const OutputField& field : file.fields)
@@ -72,7 +73,10 @@ Outside readOutside(const PictureArguments& arguments, const VdbFile& file, cons
     }
     ReadOptions options;
     for (const OutputField& field : file.fields) options.fields.push_back(field.sourceName);
-    outside.mesh = importMesh(arguments.mesh, options, decodeRepair(file.repair), session).mesh;
+    const std::optional<RepairOptions> repair = decodeRepair(file.repair);
+    ImportedMesh imported = importMesh(arguments.mesh, options, repair, session);
+    showRepair(arguments.mesh, imported, repair, session);
+    outside.mesh = std::move(imported.mesh);
     for (const OutputField& output : file.fields) {
         const auto& fields = outside.mesh.fields;
         const auto found = std::find_if(fields.begin(), fields.end(), [&](const Field& field) {
@@ -170,6 +174,8 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
 int runPicture(const PictureArguments& arguments) {
     checkOutputPaths({arguments.input, arguments.mesh},
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
+    if (arguments.mesh.empty())
+        refuseReaderBounds(arguments.common.reader, "without --mesh there is none to be read");
     Session session(arguments.common);
     checkWritable(arguments.output);
     const VdbFile file = readVdb(arguments.input);

@@ -13,6 +13,11 @@ inline constexpr const char* kReadMeshCommand = "read-mesh";
 /// To be called first in main: what is known of the process before it does anything.
 void noteStart();
 
+/// Prints to standard output at once; what goes wrong is kept.
+void printOut(const std::string& text);
+/// errno of the first thing that couldn't be printed; 0 as long as all could.
+int outputError();
+
 /// What a command runs with: threads, the flag that a signal raises, a progress bar, and how it reads.
 class Session {
   public:

@@ -97,14 +97,14 @@ void addRepairOptions(CLI::App& command, RepairArguments& a) {
         .add_option("--repair-aspect", a.aspect,
                     "elements are degenerate whose smallest height over their longest edge is below this "
                     "(default: 1e-6)")
-        ->check(CLI::Range(1e-12, 0.5))
+        ->check(numbersWithin(1e-12, 0.5))
         ->needs(repair)
         ->group(group);
     command
         .add_option("--repair-angle", a.angle,
                     "dihedral angles above this, in degrees, are large: their number tells the classes apart "
                     "(default: 150)")
-        ->check(CLI::Range(90.0, 179.0))
+        ->check(numbersWithin(90, 179))
         ->needs(repair)
         ->group(group);
     command

@@ -1,11 +1,14 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <limits>
 #include <new>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -72,6 +75,21 @@ void describe(CLI::App& app, Arguments& arguments) {
             step->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
+/// What is printed must never reach a file that happens to get the number of a closed stream: such streams
+/// are opened so that writing to them fails.
+void holdClosedStreams() {
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (::fcntl(stream, F_GETFD) < 0) ::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
+
+/// The exit code, which is that of a failure when standard output couldn't take all that was printed.
+int codeAfterOutput(int code) {
+    const int error = tessera::outputError();
+    if (error == 0) return code;
+    printError(fmt::format("standard output: {}", std::strerror(error)).c_str());
+    return code == 0 ? kExitFailure : code;
+}
+
 int run(const CLI::App& app, const Arguments& arguments) {
     if (app.got_subcommand("resample")) return tessera::runResample(arguments.resample);
     if (app.got_subcommand("info")) return tessera::runInfo(arguments.info);
@@ -121,6 +139,7 @@ int readMeshForParent(const std::vector<std::string>& words) {
 int main(int argc, char** argv) {
     if (argc > 1 && std::string(argv[1]) == tessera::kReadMeshCommand)
         _exit(readMeshForParent({argv + 2, argv + argc}));
+    holdClosedStreams();
     tessera::noteStart();
     tessera::installInterruptHandlers();
     std::set_terminate(endOutOfMemory);
@@ -130,12 +149,17 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+        if (error.get_exit_code() == 0) {  // --help, --version
+            std::ostringstream text;
+            app.exit(error, text);
+            tessera::printOut(text.str());
+            return codeAfterOutput(0);
+        }
         printError(fmt::format("{} (tessera --help tells more)", error.what()).c_str());
         return kExitBadInput;
     }
     try {
-        return run(app, arguments);
+        return codeAfterOutput(run(app, arguments));
     } catch (const tessera::Cancelled&) {
         printError("interrupted; no unfinished file is left");
         return 128 + tessera::interruptSignal();

@@ -52,6 +52,7 @@ void requirePositive(const std::string& option, double value) {
 
 void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     const std::string group = "Where to sample how finely";
+    a.common.reader.memoryBoundsRun = true;
     command
         .add_option(
             "--refine", a.refine,
@@ -98,8 +99,10 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
                     "bound on stored voxels, e.g. 500M (default: from the memory there is)")
         ->group(group);
     command
-        .add_option("--max-memory", a.common.reader.maxMemory,
-                    "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G")
+        .add_option(
+            "--max-memory", a.common.reader.maxMemory,
+            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G; with "
+            "--reader in-process reading itself has no bound")
         ->group(group);
     command
         .add_flag("--dry-run", a.dryRun,
@@ -214,13 +217,17 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
         ->capture_default_str()
         ->group(group);
     command
-        .add_option("--max-read-time", a.maxSeconds,
-                    "seconds that reading may take (default: 6, and more for files above 8 MB)")
+        .add_option(
+            "--max-read-time", a.maxSeconds,
+            "seconds that reading may take (default: 6 of processor time and 60 until the end, and more "
+            "for large files); not with --reader in-process")
         ->group(group);
     if (!command.get_option_no_throw("--max-memory"))
         command
-            .add_option("--max-memory", a.maxMemory,
-                        "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size)")
+            .add_option(
+                "--max-memory", a.maxMemory,
+                "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size); not "
+                "with --reader in-process")
             ->group(group);
 }
 
@@ -267,6 +274,23 @@ void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
         ->check(CLI::IsMember({"arithmetic", "published"}))
         ->capture_default_str()
         ->group(group);
+}
+
+void refuseReaderBounds(const ReaderArguments& a, const std::string& why) {
+    require(!a.maxSeconds, "--max-read-time bounds the reading of a mesh: " + why);
+    require(a.maxMemory.empty(), "--max-memory bounds the reading of a mesh here: " + why);
+}
+
+CLI::Validator numbersWithin(double first, double last) {
+    const auto check = [first, last](std::string& text) {
+        double value = 0;
+        const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool isNumber = failure == std::errc{} && end == text.data() + text.size();
+        return isNumber && value >= first && value <= last
+                   ? std::string()
+                   : fmt::format("expected {:g} to {:g}, got '{}'", first, last, text);
+    };
+    return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
 }
 
 BindOptions bindOptions(const AlgorithmArguments& a) {

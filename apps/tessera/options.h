@@ -17,6 +17,7 @@ namespace tessera {
 struct ReaderArguments {
     std::string kind = "isolated", maxMemory;  ///< maxMemory: empty for a bound from the file's size
     std::optional<double> maxSeconds;
+    bool memoryBoundsRun = false;  ///< the command keeps to maxMemory after reading too
 };
 
 /// Options of every subcommand.
@@ -81,6 +82,13 @@ void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& arguments);
 /// The same without --algorithm, for commands that run several.
 void addBindOptions(CLI::App& command, AlgorithmArguments& arguments);
 void addResampleOptions(CLI::App& command, ResampleArguments& arguments);
+
+/// For commands that were given no mesh to read: throws InputError when there are bounds on reading one.
+/// @param why "out.vdb is no mesh".
+void refuseReaderBounds(const ReaderArguments& arguments, const std::string& why);
+
+/// Numbers from `first` to `last`; says so in plain figures.
+CLI::Validator numbersWithin(double first, double last);
 
 BindOptions bindOptions(const AlgorithmArguments& arguments);
 /// The format's name when it isn't r32f, which loses nothing; else empty.

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
+#include <sys/auxv.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <string>
 
 #include "base/error.h"
@@ -13,10 +17,26 @@ namespace tessera {
 
 namespace {
 int threadsAtStart = 0;
+int firstOutputError = 0;
+std::string program = "/proc/self/exe";
+
+/// Options that would be without effect are refused.
+void checkReaderOptions(const ReaderArguments& reader) {
+    if (reader.kind == "isolated") return;
+    if (reader.maxSeconds)
+        throw InputError("--max-read-time bounds a process of its own: --reader in-process has none");
+    if (!reader.maxMemory.empty() && !reader.memoryBoundsRun)
+        throw InputError("--max-memory bounds a process of its own here: --reader in-process has none");
 }
+
+}  // namespace
 
 void noteStart() {
     threadsAtStart = threadCount();
+    // Without /proc it has to be the name that the program was started by, before anybody changes the folder.
+    const auto* name = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
+    std::error_code error;
+    if (::access(program.c_str(), X_OK) != 0 && name) program = std::filesystem::absolute(name, error);
 }
 
 Session::Session(const CommonOptions& options)
@@ -27,6 +47,7 @@ Session::Session(const CommonOptions& options)
     execution.cancel = &interruptFlag();
     execution.progress = &progress;
     const ReaderArguments& reader = options.reader;
+    checkReaderOptions(reader);
     if (!reader.maxMemory.empty()) limits_.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
     if (!reader.maxSeconds) return;
     limits_.seconds = *reader.maxSeconds;
@@ -36,9 +57,8 @@ Session::Session(const CommonOptions& options)
 
 MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
     if (!isolated_) return tessera::readMesh(path, options, execution);
-    static const std::string self = "/proc/self/exe";
-    static const std::string quick = quickReaderBeside(self);
-    return readMeshIsolated({self, {kReadMeshCommand}, threadsAtStart, quick}, path, options, limits_,
+    static const std::string quick = quickReaderBeside(program);
+    return readMeshIsolated({program, {kReadMeshCommand}, threadsAtStart, quick}, path, options, limits_,
                             execution);
 }
 
@@ -49,8 +69,17 @@ int runReadMesh(const std::vector<std::string>& words) {
 void Session::print(const std::string& text) {
     progress.clear();
     if (!prints_) return;
-    std::fputs(withoutControls(text).c_str(), stdout);
-    std::fflush(stdout);
+    printOut(withoutControls(text));
+}
+
+void printOut(const std::string& text) {
+    errno = 0;
+    const bool done = std::fputs(text.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+    if (!done && firstOutputError == 0) firstOutputError = errno != 0 ? errno : EIO;
+}
+
+int outputError() {
+    return firstOutputError;
 }
 
 void Session::warn(const std::string& text) {

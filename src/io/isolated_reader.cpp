@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <new>
 
 #include "base/error.h"
@@ -42,7 +43,11 @@ class IsolatedReading {
     IsolatedReading(const std::string& path, const IsolationLimits& given, const Execution& execution)
         : path_(path), given_(given), usual_(defaultLimits(path)), limits_(usual_), execution_(execution) {
         if (given.memoryBytes > 0) limits_.memoryBytes = given.memoryBytes;
-        if (given.seconds > 0) limits_.seconds = given.seconds;
+        if (given.seconds > 0) {
+            limits_.seconds = given.seconds;
+            limits_.processorSeconds = std::numeric_limits<double>::infinity();
+        }
+        if (given.processorSeconds > 0) limits_.processorSeconds = given.processorSeconds;
     }
 
     MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
@@ -51,6 +56,7 @@ class IsolatedReading {
     ReportStart awaitAnswer(ReaderProcess& process);
     MeshFile takeMesh(ReaderProcess& process, const ReportStart& answer);
     void awaitReport(ReaderProcess& process);
+    void checkTimes(double spentMs, const ReaderProcess& process) const;
     bool receive(int descriptor);
     bool isComplete() const;
     ReportStart start() const;
@@ -98,6 +104,20 @@ bool IsolatedReading::receive(int descriptor) {
     return true;
 }
 
+void IsolatedReading::checkTimes(double spentMs, const ReaderProcess& process) const {
+    const std::string taken = path_ + ": reading it took more than ";
+    const std::string usual = ", the limit for a file like this; --max-read-time sets another";
+    if (spentMs >= limits_.seconds * 1e3) {
+        if (given_.seconds <= 0) throw InputError(taken + inSeconds(limits_.seconds) + usual);
+        throw InputError(taken + inSeconds(limits_.seconds) +
+                         ", the limit given; for a file like this it would be " +
+                         inSeconds(usual_.processorSeconds) + " of processor time");
+    }
+    if (process.processorSeconds() >= limits_.processorSeconds)
+        throw InputError(taken + inSeconds(limits_.processorSeconds) + " of processor time" +
+                         (given_.processorSeconds > 0 ? ", the limit given" : usual));
+}
+
 void IsolatedReading::awaitReport(ReaderProcess& process) {
     double spentMs = 0;
     Timer timer;
@@ -110,13 +130,8 @@ void IsolatedReading::awaitReport(ReaderProcess& process) {
                              "; the file is damaged, or hits a bug of the library that reads it");
         // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the reader's.
         spentMs += std::min(timer.restart(), 5.0 * kTickMs);
+        checkTimes(spentMs, process);
         const double leftMs = limits_.seconds * 1e3 - spentMs;
-        if (leftMs <= 0)
-            throw InputError(
-                path_ + ": reading it took more than " + inSeconds(limits_.seconds) +
-                (given_.seconds > 0
-                     ? ", the limit given; for a file like this it would be " + inSeconds(usual_.seconds)
-                     : ", the limit for a file like this; --max-read-time sets another"));
         pollfd reports{process.reports(), POLLIN, 0};
         ::poll(&reports, 1, int(std::ceil(std::min(leftMs, double(kTickMs)))));
     }

@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/mapped_file.h"
+#include "io/input_file.h"
 #include "io/read_mesh.h"
+#include "io/xml_tags.h"
 
 namespace tessera {
 
@@ -52,39 +53,15 @@ std::vector<std::string> expandPattern(const std::string& pattern) {
     return files;
 }
 
-std::string decodeEntities(std::string_view text) {
-    static constexpr std::pair<std::string_view, char> kEntities[] = {
-        {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}};
-    std::string result;
-    while (!text.empty()) {
-        const auto entity = std::find_if(std::begin(kEntities), std::end(kEntities),
-                                         [&](const auto& e) { return text.starts_with(e.first); });
-        result += entity == std::end(kEntities) ? text.front() : entity->second;
-        text.remove_prefix(entity == std::end(kEntities) ? 1 : entity->first.size());
-    }
-    return result;
-}
-
 /// Value of an attribute in a tag; empty when it is absent.
-std::string attributeOf(std::string_view tag, std::string_view name) {
-    for (std::size_t at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
-        std::size_t next = at + name.size();
-        if (at == 0 || std::string_view(" \t\r\n").find(tag[at - 1]) == std::string_view::npos) continue;
-        next = tag.find_first_not_of(" \t\r\n", next);
-        if (next == std::string_view::npos || tag[next] != '=') continue;
-        next = tag.find_first_of("\"'", next);
-        if (next == std::string_view::npos) return {};
-        const std::size_t close = tag.find(tag[next], next + 1);
-        return close == std::string_view::npos ? std::string()
-                                               : decodeEntities(tag.substr(next + 1, close - next - 1));
-    }
-    return {};
+std::string valueOf(std::string_view tag, std::string_view name) {
+    return decodeEntities(attributeOf(tag, name).value_or(""));
 }
 
 /// Files that a .pvd collection names, by time; ties keep the order of the file.
 std::vector<std::string> readCollection(const std::string& path) {
-    const MappedFile file(path);
-    std::string_view text = file.bytes();
+    const std::string whole = readWholeFile(path);
+    const std::string_view text = whole;
     if (text.find("<VTKFile") == std::string_view::npos || text.find("<Collection") == std::string_view::npos)
         throw InputError(path + ": isn't a .pvd file: expected <VTKFile type=\"Collection\">");
     if (text.find("</VTKFile>") == std::string_view::npos)
@@ -99,10 +76,10 @@ std::vector<std::string> readCollection(const std::string& path) {
     for (std::size_t at = text.find("<DataSet"); at != std::string_view::npos;
          at = text.find("<DataSet", at + 1)) {
         const std::string_view tag = text.substr(at, text.find('>', at) - at);
-        const std::string name = attributeOf(tag, "file");
+        const std::string name = valueOf(tag, "file");
         if (name.empty())
             throw InputError(path + ": byte " + std::to_string(at) + ": a DataSet without a file");
-        const std::string timeText = attributeOf(tag, "timestep");
+        const std::string timeText = valueOf(tag, "timestep");
         double time = double(steps.size());
         if (!timeText.empty()) {
             const auto result = std::from_chars(timeText.data(), timeText.data() + timeText.size(), time);

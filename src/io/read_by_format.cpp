@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "io/mapped_file.h"
+#include "io/input_file.h"
 #include "io/raw_mesh.h"
 #include "io/read_tetgen.h"
 
@@ -14,6 +14,7 @@ namespace tessera {
 
 namespace {
 
+constexpr std::size_t kHeadBytes = 4096;
 constexpr const char* kFormats =
     ".vtu .pvtu .vts .pvts .vtr .pvtr .vti .pvti .vtm .vtk (VTK), .ex2 .e .exo .exii .g (Exodus), .cgns, "
     ".case .encas (EnSight), "
@@ -51,8 +52,7 @@ RawMesh readRaw(const std::string& path, const ReadOptions& options, const Execu
     const std::string extension = extensionOf(path);
     if (extension == ".foam" && std::filesystem::exists(path))  // a marker beside the case, mostly empty
         return readVtk(path, VtkFormat::openfoam, options, execution, openOther);
-    const MappedFile file(path);
-    const std::string_view head = file.bytes().substr(0, 4096);
+    const std::string head = InputFile(path).copy(0, kHeadBytes);
     if (isOneOf(extension, {".node", ".ele"})) return readTetgen(path, options);
     if (head.starts_with("# vtk DataFile"))
         return readVtk(path, VtkFormat::legacy, options, execution, openOther);

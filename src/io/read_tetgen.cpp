@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "io/mapped_file.h"
+#include "io/input_file.h"
 
 namespace tessera {
 
@@ -183,8 +183,8 @@ RawMesh readTetgen(const std::string& path, const ReadOptions& options) {
     const std::filesystem::path given(path);
     const std::string nodePath = std::filesystem::path(given).replace_extension(".node").string();
     const std::string elementPath = std::filesystem::path(given).replace_extension(".ele").string();
-    const MappedFile nodes(nodePath), elements(elementPath);
-    return parseTetgen({nodePath, nodes.bytes()}, {elementPath, elements.bytes()}, options);
+    const std::string nodes = readWholeFile(nodePath), elements = readWholeFile(elementPath);
+    return parseTetgen({nodePath, nodes}, {elementPath, elements}, options);
 }
 
 }  // namespace tessera

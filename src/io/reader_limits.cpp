@@ -1,13 +1,12 @@
-#include <glob.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <string_view>
 
+#include "io/ensight_check.h"
+#include "io/input_file.h"
 #include "io/isolated_reader.h"
-#include "io/mapped_file.h"
 #include "io/xml_check.h"
 
 namespace tessera {
@@ -19,9 +18,12 @@ namespace {
 // better.
 constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytesPerItem = 700;
 constexpr double kFloorSeconds = 6, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
+// Others may have the processors, and disks may be slow.
+constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
 // Below, a file's own word on its cells is worth nothing: its size alone bounds what it may take.
 constexpr std::int64_t kSmallFile = 8 << 20;
 constexpr int kMostFiles = 100000;
+constexpr std::size_t kHeadBytes = 4096;
 
 struct InputSize {
     double bytes = 0;
@@ -46,29 +48,6 @@ double bytesOfFolder(const std::filesystem::path& folder) {
     return bytes;
 }
 
-/// Bytes of the files that an EnSight case names: the last word of a line, with * for the number of a step.
-double bytesOfCase(const std::string& path) {
-    const MappedFile file(path);
-    double bytes = double(file.bytes().size());
-    std::string_view rest = file.bytes().substr(0, 1 << 20);
-    int files = 0;
-    while (!rest.empty() && files < kMostFiles) {
-        std::string_view line = rest.substr(0, rest.find('\n'));
-        rest.remove_prefix(std::min(line.size() + 1, rest.size()));
-        while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.remove_suffix(1);
-        const std::size_t space = line.find_last_of(" \t");
-        if (space == std::string_view::npos) continue;
-        std::string name(line.substr(space + 1));
-        std::replace(name.begin(), name.end(), '*', '?');
-        glob_t found{};
-        if (::glob((std::filesystem::path(path).parent_path() / name).c_str(), 0, nullptr, &found) == 0)
-            for (std::size_t i = 0; i < found.gl_pathc && files < kMostFiles; ++i, ++files)
-                bytes += double(sizeOf(found.gl_pathv[i]));
-        ::globfree(&found);
-    }
-    return bytes;
-}
-
 InputSize sizeOfInput(const std::string& path) {
     const std::filesystem::path given(path);
     std::string extension = given.extension().string();
@@ -76,31 +55,35 @@ InputSize sizeOfInput(const std::string& path) {
                    [](unsigned char c) { return char(std::tolower(c)); });
     if (extension == ".foam" && std::filesystem::exists(given))
         return {bytesOfFolder(given.parent_path()), 0};
-    const MappedFile file(path);
-    const std::string_view head = file.bytes().substr(0, 4096);
+    InputFile file(path);
+    const std::string head = file.copy(0, kHeadBytes);
     const bool isLegacy = head.starts_with("# vtk DataFile");
-    if (isLegacy || head.find("<VTKFile") != std::string_view::npos) {
+    if (isLegacy || head.find("<VTKFile") != std::string::npos) {
         const DeclaredSize size = isLegacy ? checkLegacyFile(path) : checkXmlFile(path);
         const std::int64_t cells = size.fileBytes > kSmallFile ? size.cellsOfAll : 0;
         return {double(size.fileBytes), double(std::max(cells, size.gridPoints))};
     }
-    if (extension == ".case" || extension == ".encas") return {bytesOfCase(path), 0};
+    if (extension == ".case" || extension == ".encas") return {double(checkEnSightCase(path)), 0};
     if (extension == ".node" || extension == ".ele")
         return {double(sizeOf(std::filesystem::path(given).replace_extension(".node")) +
                        sizeOf(std::filesystem::path(given).replace_extension(".ele"))),
                 0};
-    return {double(file.bytes().size()), 0};
+    return {double(file.size()), 0};
 }
 
 }  // namespace
 
 IsolationLimits defaultLimits(const std::string& path) {
     const InputSize size = sizeOfInput(path);
+    IsolationLimits limits;
     double bytes = kFloorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items);
     const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
     if (pages > 0 && pageBytes > 0) bytes = std::min(bytes, 0.75 * double(pages) * double(pageBytes));
-    return {std::int64_t(bytes),
-            kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items)};
+    limits.memoryBytes = std::int64_t(bytes);
+    limits.processorSeconds =
+        kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
+    limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
+    return limits;
 }
 
 }  // namespace tessera

@@ -4,8 +4,10 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -25,17 +27,24 @@ namespace tessera {
 namespace {
 
 constexpr int kFirstSpare = 10;  // above every descriptor that the child gets
+constexpr int kFewestFiles = 32;
 constexpr int kEndMs = 2000;
 constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
 
 [[noreturn]] void failToStart(const std::string& what, int error) {
-    throw IoError("can't start the process that reads meshes: " + what + ": " + std::strerror(error));
+    std::string line = "can't start the process that reads meshes: " + what + ": " + std::strerror(error);
+    rlimit files{};
+    if (error == EMFILE && ::getrlimit(RLIMIT_NOFILE, &files) == 0)
+        line += ": at most " + std::to_string(files.rlim_cur) + " are allowed here (ulimit -n), " +
+                std::to_string(kFewestFiles) + " will do";
+    throw IoError(line);
 }
 
 /// A copy that no dup2 in the child overwrites.
 Descriptor spareCopy(const Descriptor& descriptor) {
     const int copy = ::fcntl(descriptor.get(), F_DUPFD_CLOEXEC, kFirstSpare);
-    if (copy < 0) failToStart("descriptor", errno);
+    // Numbers from kFirstSpare on may all be forbidden.
+    if (copy < 0) failToStart("descriptor", errno == EINVAL ? EMFILE : errno);
     return Descriptor(copy);
 }
 
@@ -214,6 +223,14 @@ void ReaderProcess::kill() {
     ::kill(child_, SIGKILL);
     while (::waitpid(child_, nullptr, 0) < 0 && errno == EINTR) continue;
     child_ = -1;
+}
+
+double ReaderProcess::processorSeconds() const {
+    clockid_t clock{};
+    timespec time{};
+    if (child_ < 0 || ::clock_getcpuclockid(child_, &clock) != 0 || ::clock_gettime(clock, &time) != 0)
+        return 0;
+    return double(time.tv_sec) + double(time.tv_nsec) * 1e-9;
 }
 
 std::string ReaderProcess::describeEnd() {

@@ -59,6 +59,8 @@ class ReaderProcess {
 
     int reports() const { return reports_.get(); }  ///< never blocks
     int mesh() const { return mesh_.get(); }
+    /// Processor time that the child has taken so far, of all its threads; 0 when it has ended.
+    double processorSeconds() const;
     /// Says how a child ended that closed its reports: "crashed (signal 11, Segmentation fault)", "ended
     /// without a result (exit code 7)". Kills it if it hasn't ended after all.
     std::string describeEnd();

@@ -1,4 +1,5 @@
 #include <fcntl.h>
+#include <link.h>
 #include <malloc.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -30,6 +31,7 @@ namespace {
 constexpr std::size_t kLongestMessage = 1 << 16;
 constexpr int kMostArenas = 1;                  // more reserve 64 MB of address space each
 constexpr std::int64_t kThreadBytes = 9 << 20;  // a thread's stack, used or not
+constexpr std::int64_t kThreadShare = 8;        // threads take an eighth of the bound at most
 
 void writeAll(int descriptor, const void* bytes, std::size_t count) {
     const char* next = static_cast<const char*>(bytes);
@@ -49,14 +51,40 @@ void report(ReaderOutcome outcome, std::string message) {
     writeAll(kReportDescriptor, message.data(), message.size());
 }
 
+/// How many threads may read so that their stacks leave the memory to the mesh.
+int threadsWithin(const ReaderRequest& request) {
+    Execution execution;
+    execution.threads = request.threads;
+    const std::int64_t most = std::max<std::int64_t>(1, request.memoryBytes / (kThreadShare * kThreadBytes));
+    return int(std::min<std::int64_t>(execution.threadCount(), most));
+}
+
 #ifndef TESSERA_SHADOW_MEMORY
+constexpr std::int64_t kUnseenBytes = 256 << 20;  // heaps and stacks, rounded up
+
+int addSpan(dl_phdr_info* object, std::size_t, void* sum) {
+    ElfW(Addr) first = ~ElfW(Addr)(0), last = 0;
+    for (int h = 0; h < object->dlpi_phnum; ++h) {
+        const ElfW(Phdr)& part = object->dlpi_phdr[h];
+        if (part.p_type != PT_LOAD) continue;
+        first = std::min(first, part.p_vaddr);
+        last = std::max(last, part.p_vaddr + part.p_memsz);
+    }
+    if (last > first) *static_cast<std::int64_t*>(sum) += std::int64_t(last - first);
+    return 0;
+}
+
+/// What the program takes now; where /proc is missing what it may take with all its libraries.
 std::int64_t addressSpaceBytes() {
     long long pages = 0;
     if (std::FILE* file = std::fopen("/proc/self/statm", "re")) {
         if (std::fscanf(file, "%lld", &pages) != 1) pages = 0;
         std::fclose(file);
     }
-    return pages * ::sysconf(_SC_PAGE_SIZE);
+    if (pages > 0) return pages * ::sysconf(_SC_PAGE_SIZE);
+    std::int64_t bytes = kUnseenBytes;
+    ::dl_iterate_phdr(addSpan, &bytes);
+    return bytes;
 }
 #endif
 
@@ -75,11 +103,8 @@ bool lowerLimit(__rlimit_resource resource, rlim_t value) {
 ReaderOutcome limitMemory([[maybe_unused]] const ReaderRequest& request) {
 #ifndef TESSERA_SHADOW_MEMORY
     ::mallopt(M_ARENA_MAX, kMostArenas);
-    Execution execution;
-    execution.threads = request.threads;
-    const auto bytes =
-        rlim_t(addressSpaceBytes() + request.memoryBytes + kThreadBytes * execution.threadCount());
-    if (!lowerLimit(RLIMIT_AS, bytes)) return ReaderOutcome::outOfMemory;
+    if (!lowerLimit(RLIMIT_AS, rlim_t(addressSpaceBytes() + request.memoryBytes)))
+        return ReaderOutcome::outOfMemory;
 #endif
     return ReaderOutcome::overLimit;
 }
@@ -140,7 +165,7 @@ int serveMeshReader(std::span<const std::string> arguments, const MeshReader& re
     std::set_terminate(reportAndEnd);
     try {
         Execution execution;
-        execution.threads = request.threads;
+        execution.threads = threadsWithin(request);
         handOver(read(request.path, request.options, execution), request.memoryBytes);
     } catch (const TooLargeError&) {
         report(memoryRanOut, {});

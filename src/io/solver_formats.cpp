@@ -6,6 +6,7 @@
 #include <vtkOpenFOAMReader.h>
 
 #include "base/error.h"
+#include "io/ensight_check.h"
 #include "io/open_check.h"
 #include "io/vtk_source.h"
 
@@ -43,6 +44,7 @@ VtkSource openCgns(const std::string& path) {
 }
 
 VtkSource openEnSight(const std::string& path) {
+    checkEnSightCase(path);
     auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
     reader->SetCaseFileName(path.c_str());
     reader->ReadAllVariablesOn();

@@ -50,13 +50,14 @@ struct PackedPlace {
 
 class PackedArray {
   public:
-    PackedArray(const std::string& path, std::string_view text, const XmlTag& tag, const XmlPacking& packing,
-                const PackedPlace& place)
-        : path_(path), tag_(tag), packing_(packing), place_(place) {
-        const std::string_view stored = text.substr(place.begin, place.end - place.begin);
+    PackedArray(InputFile& file, const XmlTag& tag, const XmlPacking& packing, const PackedPlace& place)
+        : path_(file.path()), tag_(tag), packing_(packing), place_(place) {
+        const std::size_t bytes = place.end - place.begin;
         // Three characters of every four hold bytes.
-        room_ = place.base64 ? double(stored.size()) * 0.75 : double(stored.size());
+        room_ = place.base64 ? double(bytes) * 0.75 : double(bytes);
         const std::size_t most = 3 * std::size_t(packing.headerBytes);
+        const std::string_view stored =
+            file.bytesFrom(place.begin, 2 * most).substr(0, std::min(bytes, 2 * most));
         head_ = place.base64
                     ? decodeBase64(stored, most)
                     : std::vector<unsigned char>(
@@ -100,7 +101,7 @@ class PackedArray {
 
 }  // namespace
 
-XmlPacking packingOf(std::string_view text, std::string_view root, std::size_t appendedTag) {
+XmlPacking packingOf(InputFile& file, std::string_view root, std::size_t appendedTag) {
     XmlPacking packing;
     packing.headerBytes = attributeOf(root, "header_type") == "UInt64" ? 8 : 4;
     packing.bigEndian = attributeOf(root, "byte_order") == "BigEndian";
@@ -112,25 +113,24 @@ XmlPacking packingOf(std::string_view text, std::string_view root, std::size_t a
         packing.largestRatio = kLz4Ratio;
     else if (packing.compressed)
         packing.largestRatio = std::nullopt;
-    if (appendedTag == std::string_view::npos) return packing;
-    XmlTags tags(text, appendedTag);
+    if (appendedTag == InputFile::npos) return packing;
+    XmlTags tags(file, appendedTag, file.size());
     const auto tag = tags.next();
     if (!tag) return packing;
     packing.appendedIsBase64 = attributeOf(tag->text, "encoding") != "raw";
-    const std::size_t mark = text.find('_', tag->end);
-    if (mark == std::string_view::npos) return packing;
+    const std::size_t mark = file.find("_", tag->end);
+    if (mark == InputFile::npos) return packing;
     packing.appendedAt = mark + 1;
-    packing.appendedEnd = std::max(mark + 1, std::min(text.rfind("</AppendedData"), text.size()));
+    packing.appendedEnd = std::max(mark + 1, std::min(file.rfind("</AppendedData"), file.size()));
     return packing;
 }
 
-void checkPackedArray(const std::string& path, std::string_view text, const XmlTag& tag,
-                      const XmlPacking& packing) {
+void checkPackedArray(InputFile& file, const XmlTag& tag, const XmlPacking& packing) {
     const std::string_view format = attributeOf(tag.text, "format").value_or("");
     PackedPlace place{tag.end, tag.end, true};
     if (format == "binary") {
-        place.begin = std::min(text.find_first_not_of(" \t\r\n", tag.end), text.size());
-        place.end = std::min(text.find('<', place.begin), text.size());
+        place.begin = std::min(file.findFirstNotOf(" \t\r\n", tag.end), file.size());
+        place.end = std::min(file.find("<", place.begin), file.size());
         if (place.begin == place.end) return;  // no values at all
     } else if (format == "appended" && packing.appendedAt) {
         const auto offsetText = attributeOf(tag.text, "offset");
@@ -140,14 +140,14 @@ void checkPackedArray(const std::string& path, std::string_view text, const XmlT
             std::from_chars(offsetText->data(), offsetText->data() + offsetText->size(), offset);
         const std::uint64_t room = packing.appendedEnd - *packing.appendedAt;
         if (result.ec != std::errc() || offset >= room)
-            throw InputError(path + ": damaged or cut off: byte " + std::to_string(tag.begin) +
+            throw InputError(file.path() + ": damaged or cut off: byte " + std::to_string(tag.begin) +
                              ": an array's offset is " + quoted(*offsetText) + ", there are " +
                              std::to_string(room) + " bytes of appended data");
         place = {*packing.appendedAt + offset, packing.appendedEnd, packing.appendedIsBase64};
     } else {
         return;
     }
-    PackedArray(path, text, tag, packing, place).check();
+    PackedArray(file, tag, packing, place).check();
 }
 
 }  // namespace tessera

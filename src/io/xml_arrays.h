@@ -21,12 +21,12 @@ struct XmlPacking {
 };
 
 /// From the attributes of <VTKFile>, and <AppendedData> when there is one.
-XmlPacking packingOf(std::string_view text, std::string_view root, std::size_t appendedTag);
+/// @param appendedTag its byte; npos without one.
+XmlPacking packingOf(InputFile& file, std::string_view root, std::size_t appendedTag);
 
 /// Checks the sizes that stand in front of an array's values against the bytes that follow. Throws InputError
 /// with the byte.
-/// @param tag the array's <DataArray>; @param text the file.
-void checkPackedArray(const std::string& path, std::string_view text, const XmlTag& tag,
-                      const XmlPacking& packing);
+/// @param tag the array's <DataArray>.
+void checkPackedArray(InputFile& file, const XmlTag& tag, const XmlPacking& packing);
 
 }  // namespace tessera

@@ -4,12 +4,12 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
-#include <map>
 #include <optional>
+#include <set>
 #include <string_view>
 
 #include "base/error.h"
-#include "io/mapped_file.h"
+#include "io/input_file.h"
 #include "io/xml_arrays.h"
 #include "io/xml_tags.h"
 
@@ -19,25 +19,27 @@ namespace {
 
 constexpr std::string_view kSpaces = " \t\r\n";
 constexpr int kDeepest = 8;
+constexpr std::size_t kQuoted = 32;  // more than a message shows
 constexpr double kMostNodes = 2147483647;
 constexpr std::int64_t kMostCounted = std::int64_t(1) << 50;
 
 /// Skips blanks, comments and declarations from `at`.
-std::size_t skipProlog(std::string_view text, std::size_t at) {
+std::size_t skipProlog(InputFile& file, std::size_t at) {
     while (true) {
-        at = text.find_first_not_of(kSpaces, at);
-        if (at == std::string_view::npos) return text.size();
+        at = file.findFirstNotOf(kSpaces, at);
+        if (at == InputFile::npos) return file.size();
+        const std::string_view text = file.bytesFrom(at, 4);
         std::string_view end;
-        if (text.substr(at).starts_with("<?"))
+        if (text.starts_with("<?"))
             end = "?>";
-        else if (text.substr(at).starts_with("<!--"))
+        else if (text.starts_with("<!--"))
             end = "-->";
-        else if (text.substr(at).starts_with("<!"))
+        else if (text.starts_with("<!"))
             end = ">";
         else
             return at;
-        const std::size_t close = text.find(end, at);
-        if (close == std::string_view::npos) return text.size();
+        const std::size_t close = file.find(end, at);
+        if (close == InputFile::npos) return file.size();
         at = close + end.size();
     }
 }
@@ -60,19 +62,19 @@ struct Extent {
 
 class XmlCheck {
   public:
-    explicit XmlCheck(std::map<std::string, DeclaredSize>& known) : known_(known) {}
     DeclaredSize run(const std::string& path, int depth);
 
   private:
     /// One file while it is looked at.
     struct File {
+        InputFile& input;
         const std::string& path;
-        std::string_view text;
         int depth;
         XmlPacking packing;
         std::optional<double> unpackedBound;  ///< the most bytes that the file can hold, unpacked
         DeclaredSize size;
-        std::string_view section;  ///< "PointData", "Cells", ...
+        std::size_t markupEnd = 0;  ///< where appended data begin, or the file's end
+        std::string section;        ///< "PointData", "Cells", ...
         double piecePoints = 0, pieceCells = 0;
         double wholePoints = -1;
         double pointsOfPieces = 0;
@@ -89,7 +91,7 @@ class XmlCheck {
     std::int64_t count(const File& file, const XmlTag& tag, std::string_view name) const;
     std::optional<Extent> extent(const File& file, const XmlTag& tag, std::string_view name) const;
 
-    std::map<std::string, DeclaredSize>& known_;
+    std::set<std::string> known_;  ///< files that were looked at
 };
 
 std::int64_t XmlCheck::count(const File& file, const XmlTag& tag, std::string_view name) const {
@@ -131,32 +133,32 @@ std::optional<Extent> XmlCheck::extent(const File& file, const XmlTag& tag, std:
 /// Checks the file from its first to its last byte, and returns where the tags inside <VTKFile> begin.
 std::size_t XmlCheck::checkFrame(File& file) const {
     const std::string& path = file.path;
-    const std::string_view text = file.text;
-    const std::size_t start = skipProlog(text, text.starts_with("\xef\xbb\xbf") ? 3 : 0);
-    if (!text.substr(start).starts_with("<VTKFile"))
+    InputFile& input = file.input;
+    const std::size_t start = skipProlog(input, input.bytesFrom(0, 3).starts_with("\xef\xbb\xbf") ? 3 : 0);
+    if (!input.bytesFrom(start, 8).starts_with("<VTKFile"))
         throw InputError(path + ": isn't a VTK XML file: byte " + std::to_string(start) + " has " +
-                         quoted(text.substr(start)) + ", expected <VTKFile");
-    const std::size_t rootEnd = text.find('>', start);
-    if (rootEnd == std::string_view::npos)
-        throw InputError(path + ": cut off at byte " + std::to_string(text.size()) + ", inside <VTKFile");
-    const std::string_view root = text.substr(start, rootEnd - start);
-    const auto type = attributeOf(root, "type");
+                         quoted(input.bytesFrom(start, kQuoted)) + ", expected <VTKFile");
+    const auto tag = XmlTags(input, start, start + 1).next();
+    if (!tag)
+        throw InputError(path + ": cut off at byte " + std::to_string(input.size()) + ", inside <VTKFile");
+    const auto type = attributeOf(tag->text, "type");
     if (!type) throw InputError(path + ": <VTKFile has no type");
     file.size.type = std::string(*type);
 
     const std::string_view endTag = "</VTKFile>";
-    const std::size_t end = text.rfind(endTag);
-    if (end == std::string_view::npos || end < rootEnd)
-        throw InputError(path + ": cut off: byte " + std::to_string(text.size()) +
+    const std::size_t end = input.rfind(endTag);
+    if (end == InputFile::npos || end < tag->end)
+        throw InputError(path + ": cut off: byte " + std::to_string(input.size()) +
                          " is its last, and there is no </VTKFile>");
-    const std::size_t after = skipProlog(text, end + endTag.size());
-    if (after < text.size())
+    const std::size_t after = skipProlog(input, end + endTag.size());
+    if (after < input.size())
         throw InputError(path + ": damaged: byte " + std::to_string(after) + " has " +
-                         quoted(text.substr(after)) + " after </VTKFile>");
-    const std::size_t appended = text.find("<AppendedData", rootEnd);
-    file.packing = packingOf(text, root, appended);
-    if (file.packing.largestRatio) file.unpackedBound = *file.packing.largestRatio * double(text.size());
-    return rootEnd;
+                         quoted(input.bytesFrom(after, kQuoted)) + " after </VTKFile>");
+    file.markupEnd = std::min(input.find("<AppendedData", tag->end), input.size());
+    file.packing =
+        packingOf(input, tag->text, file.markupEnd == input.size() ? InputFile::npos : file.markupEnd);
+    if (file.packing.largestRatio) file.unpackedBound = *file.packing.largestRatio * double(input.size());
+    return tag->end;
 }
 
 /// <StructuredGrid WholeExtent="..."> and the like: VTK allocates for that box, whatever its pieces hold.
@@ -191,9 +193,9 @@ void XmlCheck::checkArray(File& file, const XmlTag& tag) const {
         throw InputError(file.path + ": damaged: byte " + std::to_string(tag.begin) + ": array " +
                          quoted(attributeOf(tag.text, "Name").value_or("")) + " of " +
                          std::to_string(std::int64_t(tuples)) + " values with " + std::to_string(components) +
-                         " components is more than " + std::to_string(file.text.size()) + " bytes can hold");
+                         " components is more than " + std::to_string(file.input.size()) + " bytes can hold");
     if (file.piecePoints == 0 || (file.section == "CellData" && tuples == 0)) return;
-    checkPackedArray(file.path, file.text, tag, file.packing);
+    checkPackedArray(file.input, tag, file.packing);
     if (file.wholePoints < 0 || file.pieceHasValues) return;
     if (file.section != "PointData" && file.section != "CellData") return;
     file.pieceHasValues = true;
@@ -203,11 +205,13 @@ void XmlCheck::checkArray(File& file, const XmlTag& tag) const {
 void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute) {
     const auto name = attributeOf(tag.text, attribute);
     if (!name || name->empty()) return;
-    const auto piece = std::filesystem::path(file.path).parent_path() / std::string(*name);
+    const auto piece = std::filesystem::path(file.path).parent_path() / decodeEntities(*name);
     std::error_code error;
     if (!std::filesystem::exists(piece, error))
         throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": names " + piece.string() +
                          ", which doesn't exist");
+    // A file that is named a thousand times is no reason to allow a thousand times its memory.
+    if (known_.contains(std::filesystem::weakly_canonical(piece, error).string())) return;
     const DeclaredSize size = run(piece.string(), file.depth + 1);
     addCount(file.size.fileBytes, size.fileBytes);
     addCount(file.size.cellsOfAll, size.cellsOfAll);
@@ -215,18 +219,18 @@ void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view at
 }
 
 void XmlCheck::checkTag(File& file, const XmlTag& tag) {
-    if (tag.name == file.size.type) {
+    if (tag.name() == file.size.type) {
         checkGrid(file, tag);
-    } else if (tag.name == "Piece") {
+    } else if (tag.name() == "Piece") {
         if (!file.size.type.starts_with('P')) return checkPiece(file, tag);
         if (const auto box = extent(file, tag, "Extent")) file.pointsOfPieces += box->pointCount();
         checkNamedFile(file, tag, "Source");
-    } else if (tag.name == "DataSet" && file.size.type.starts_with("vtk")) {
+    } else if (tag.name() == "DataSet" && file.size.type.starts_with("vtk")) {
         checkNamedFile(file, tag, "file");
-    } else if (tag.name == "DataArray" || tag.name == "Array") {
+    } else if (tag.name() == "DataArray" || tag.name() == "Array") {
         checkArray(file, tag);
     } else {
-        file.section = tag.name;
+        file.section = tag.name();
     }
 }
 
@@ -246,31 +250,27 @@ void XmlCheck::checkSums(const File& file) const {
                               ? std::to_string(std::int64_t(file.pointsOfPieces)) + " points"
                               : std::to_string(file.size.points) + " points and " +
                                     std::to_string(file.size.cells) + " cells") +
-                         ", more than " + std::to_string(file.text.size()) + " bytes can hold");
+                         ", more than " + std::to_string(file.input.size()) + " bytes can hold");
 }
 
 DeclaredSize XmlCheck::run(const std::string& path, int depth) {
     if (depth > kDeepest) throw InputError(path + ": files name each other more than 8 deep");
-    std::error_code error;
-    const std::string key = std::filesystem::weakly_canonical(path, error).string();
-    if (const auto before = known_.find(key); before != known_.end()) return before->second;
-    const MappedFile mapped(path);
-    File file{path, mapped.bytes(), depth, {}, {}, {}, {}, 0, 0, -1, 0, false};
-    file.size.fileBytes = std::int64_t(file.text.size());
+    InputFile input(path);
+    File file{input, path, depth, {}, {}, {}, 0, {}, 0, 0, -1, 0, false};
+    file.size.fileBytes = std::int64_t(input.size());
     const std::size_t inside = checkFrame(file);
-    const std::string_view markup = file.text.substr(0, file.text.find("<AppendedData", inside));
-    XmlTags tags(markup, inside);
+    XmlTags tags(input, inside, file.markupEnd);
     while (const auto tag = tags.next()) checkTag(file, *tag);
     checkSums(file);
-    known_[key] = file.size;
+    std::error_code error;
+    known_.insert(std::filesystem::weakly_canonical(path, error).string());
     return file.size;
 }
 
 }  // namespace
 
 DeclaredSize checkXmlFile(const std::string& path) {
-    std::map<std::string, DeclaredSize> known;
-    return XmlCheck(known).run(path, 0);
+    return XmlCheck().run(path, 0);
 }
 
 }  // namespace tessera

@@ -10,7 +10,7 @@ struct DeclaredSize {
     std::string type;         ///< of VTK XML files, e.g. "UnstructuredGrid"
     std::int64_t points = 0;  ///< summed over the file's pieces; the files that it names left out
     std::int64_t cells = 0;
-    std::int64_t fileBytes = 0;   ///< with all files that it names
+    std::int64_t fileBytes = 0;   ///< with all files that it names, each once
     std::int64_t cellsOfAll = 0;  ///< the same, of unstructured grids
     std::int64_t gridPoints = 0;  ///< the same, points of structured grids that have values
 };
