@@ -1,5 +1,5 @@
-// Times reading a mesh in this process against reading it in a process of its own, runs interleaved: in a
-// program that has threads, which starts the reader anew, and in fresh runs of `tessera info`, which fork it.
+// Times reading a mesh in this process against reading it in a process of its own, runs interleaved: in this
+// program, and in fresh runs of `tessera info`.
 // isolated_read mesh.vtu [--runs 9] [--threads 0] [--program build/release/apps/tessera/tessera]
 // [--csv bench/results/isolated_read.csv]
 
@@ -96,7 +96,7 @@ std::string report(const Options& options, const Pair& pair) {
 void compare(const Options& options) {
     tessera::Execution execution;
     execution.threads = options.threads;
-    const tessera::IsolatedReader reader{options.program, {"read-mesh"}, 0, options.reader};
+    const tessera::IsolatedReader reader{options.program, {"read-mesh"}, options.reader};
     Pair library{"library", {}, {}}, program{"command line", {}, {}};
     for (int r = -1; r < options.runs; ++r) {  // the first round warms the file cache
         const Sample samples[] = {

@@ -36,7 +36,7 @@ IsolatedReader childThat(const std::string& mode) {
 
 /// The program for common formats first; the other one goes wrong when it is told to.
 IsolatedReader quickReader(const std::string& modeOfTheOther) {
-    return {TESSERA_MISBEHAVING_READER, {modeOfTheOther}, 0, TESSERA_QUICK_READER};
+    return {TESSERA_MISBEHAVING_READER, {modeOfTheOther}, TESSERA_QUICK_READER};
 }
 
 VtuText twoTets() {

@@ -16,7 +16,6 @@
 namespace tessera {
 
 namespace {
-int threadsAtStart = 0;
 int firstOutputError = 0;
 std::string program = "/proc/self/exe";
 
@@ -32,7 +31,6 @@ void checkReaderOptions(const ReaderArguments& reader) {
 }  // namespace
 
 void noteStart() {
-    threadsAtStart = threadCount();
     // Without /proc it has to be the name that the program was started by, before anybody changes the folder.
     const auto* name = reinterpret_cast<const char*>(::getauxval(AT_EXECFN));
     std::error_code error;
@@ -58,8 +56,7 @@ Session::Session(const CommonOptions& options)
 MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
     if (!isolated_) return tessera::readMesh(path, options, execution);
     static const std::string quick = quickReaderBeside(program);
-    return readMeshIsolated({program, {kReadMeshCommand}, threadsAtStart, quick}, path, options, limits_,
-                            execution);
+    return readMeshIsolated({program, {kReadMeshCommand}, quick}, path, options, limits_, execution);
 }
 
 int runReadMesh(const std::vector<std::string>& words) {

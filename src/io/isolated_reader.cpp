@@ -180,10 +180,6 @@ MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& an
 MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
     const std::vector<std::string> request =
         requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
-    if (reader.threadsAtStart > 0 && threadCount() == reader.threadsAtStart) {
-        ReaderProcess copy([&] { return serveMeshReader(request); });
-        return takeMesh(copy, awaitAnswer(copy));
-    }
     if (!reader.quickExecutable.empty()) {
         ReaderProcess quick(reader.quickExecutable, request);
         const ReportStart answer = awaitAnswer(quick);
@@ -196,12 +192,6 @@ MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& o
 }
 
 }  // namespace
-
-int threadCount() {
-    std::error_code error;
-    const std::filesystem::directory_iterator threads("/proc/self/task", error);
-    return error ? 0 : int(std::distance(begin(threads), end(threads)));
-}
 
 std::string quickReaderBeside(const std::string& executable) {
     namespace fs = std::filesystem;

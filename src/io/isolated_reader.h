@@ -10,27 +10,18 @@
 
 namespace tessera {
 
-/// The program that reads in a process of its own: one that calls serveMeshReader with the arguments it finds
-/// behind these.
+/// The programs that read in a process of their own.
 struct IsolatedReader {
+    /// One that calls serveMeshReader with the arguments it finds behind these.
     std::string executable;
     std::vector<std::string> arguments;
-    /// When the program is the one that runs now: threadCount() at the start of its main. As long as there
-    /// are no more, the threads beside this one are sleepers that libraries start as they are loaded, and a
-    /// copy of the process (fork) reads: that spares the tenth of a second that loading the libraries takes.
-    /// 0: always start the program.
-    int threadsAtStart = 0;
-    /// A program to start before the one above, e.g. tessera_read_mesh: one that reads the common formats
-    /// alone (readCommonMesh), and so starts ten times faster. It is given nothing but the request; empty:
-    /// none.
+    /// One that is tried before it, as tessera_read_mesh: it reads the common formats alone (readCommonMesh),
+    /// and so starts ten times faster. It is given the request alone. Empty: none.
     std::string quickExecutable{};
 };
 
-/// The installed or built tessera_read_mesh that belongs to a tessera program; empty when there is none.
+/// The built or installed tessera_read_mesh that belongs to a tessera program; empty when there is none.
 std::string quickReaderBeside(const std::string& executable);
-
-/// Threads of this process; 0 where the system doesn't tell.
-int threadCount();
 
 /// Bounds on the reading process. 0 means one from the size of the file, see defaultLimits.
 struct IsolationLimits {

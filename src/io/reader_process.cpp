@@ -122,18 +122,6 @@ class SpawnPlan {
     posix_spawnattr_t attributes_;
 };
 
-/// Leaves a copy of this process with the descriptors of a started program.
-void takeDescriptors(const Descriptor& reports, const Descriptor& mesh) {
-    const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-    bool done = nowhere >= 0;
-    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-        done = done && ::dup2(nowhere, stream) == stream;
-    done = done && ::dup2(reports.get(), kReportDescriptor) == kReportDescriptor &&
-           ::dup2(mesh.get(), kMeshDescriptor) == kMeshDescriptor &&
-           ::close_range(kMeshDescriptor + 1, ~0U, 0) == 0;
-    if (!done) ::_exit(EXIT_FAILURE);
-}
-
 std::string describe(int status) {
     if (WIFEXITED(status))
         return "ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")";
@@ -190,28 +178,6 @@ ReaderProcess::ReaderProcess(const std::string& executable, const std::vector<st
     child_ = SpawnPlan(childReports_, childMesh_).spawn(executable, arguments);
     childReports_.close();
     childMesh_.close();
-}
-
-ReaderProcess::ReaderProcess(const std::function<int()>& work) {
-    open();
-    const sigset_t blocked = maskOfChild();
-    sigset_t before;
-    pthread_sigmask(SIG_SETMASK, &blocked, &before);
-    child_ = ::fork();
-    if (child_ == 0) {
-        takeDescriptors(childReports_, childMesh_);
-        int code = EXIT_FAILURE;
-        try {
-            code = work();
-        } catch (...) {  // nobody is left to tell
-        }
-        ::_exit(code);
-    }
-    const int error = errno;
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-    childReports_.close();
-    childMesh_.close();
-    if (child_ < 0) failToStart("fork", error);
 }
 
 ReaderProcess::~ReaderProcess() {

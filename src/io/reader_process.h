@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,9 +49,6 @@ class ReaderProcess {
   public:
     /// Throws IoError when the program can't be started.
     ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments);
-    /// The same with a copy of this process, which runs `work` and ends with its result. No other thread may
-    /// hold a lock that `work` takes, but for those of the C library.
-    explicit ReaderProcess(const std::function<int()>& work);
     ~ReaderProcess();
     ReaderProcess(const ReaderProcess&) = delete;
     ReaderProcess& operator=(const ReaderProcess&) = delete;
