@@ -228,14 +228,24 @@ std::string describe(const LatticeCase& at) {
 
 }  // namespace
 
+Measure::Measure(const TetMesh& mesh, const LatticeCase& at, const Execution& execution)
+    : at_(at), execution_(execution), oracle_(mesh, at.lattice), fields_(allFields(mesh)) {}
+
+ContractReport Measure::operator()(const Subject& subject, const Block& block, const CheckOptions& options) {
+    const ContractBounds bounds = subject.bounds();
+    auto reference = std::find_if(references_.begin(), references_.end(), [&](const ReferenceBlock& r) {
+        return r.toleranceVoxels == bounds.spillVoxels;
+    });
+    if (reference == references_.end())
+        reference = references_.insert(
+            reference, referenceBlock(oracle_, at_.box, {.toleranceVoxels = bounds.spillVoxels}, execution_));
+    return checkContract(block, *reference, oracle_, fields_, bounds, options);
+}
+
 ContractReport measureContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,
                                const CheckOptions& options) {
-    const std::vector<int> fields = allFields(mesh);
-    const ContractBounds bounds = subject.bounds();
-    const Block block = sample(subject, mesh, fields, at.lattice, at.box);
-    const Oracle oracle(mesh, at.lattice);
-    const ReferenceBlock reference = referenceBlock(oracle, at.box, {.toleranceVoxels = bounds.spillVoxels});
-    return checkContract(block, reference, oracle, fields, bounds, options);
+    const Block block = sample(subject, mesh, allFields(mesh), at.lattice, at.box);
+    return Measure(mesh, at)(subject, block, options);
 }
 
 ContractReport expectContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,

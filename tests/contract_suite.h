@@ -79,7 +79,22 @@ std::vector<IndexBox> cut(const IndexBox& box, int edge);
 /// its box.
 std::int64_t differences(const Block& part, const Block& whole);
 
-/// Clauses 1 to 5 at every point.
+/// Clauses 1 to 5 at every point of one mesh's lattice, for several subjects. Mesh and lattice must outlive
+/// it.
+class Measure {
+  public:
+    Measure(const TetMesh& mesh, const LatticeCase& at, const Execution& execution = {});
+    ContractReport operator()(const Subject& subject, const Block& block, const CheckOptions& options = {});
+
+  private:
+    const LatticeCase& at_;
+    Execution execution_;
+    Oracle oracle_;
+    std::vector<int> fields_;
+    std::vector<ReferenceBlock> references_;  ///< one for every tolerance asked for
+};
+
+/// The same for a block sampled on the way.
 ContractReport measureContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,
                                const CheckOptions& options = {});
 /// The same; fails the test with the first offence.

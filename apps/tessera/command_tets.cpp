@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
+
 #include "base/timer.h"
 #include "commands.h"
 #include "import_mesh.h"

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -86,7 +87,8 @@ void holdClosedStreams() {
 int codeAfterOutput(int code) {
     const int error = tessera::outputError();
     if (error == 0) return code;
-    printError(fmt::format("standard output: {}", std::strerror(error)).c_str());
+    if (error != EPIPE)  // whoever reads has seen enough
+        printError(fmt::format("standard output: {}", std::strerror(error)).c_str());
     return code == 0 ? kExitFailure : code;
 }
 

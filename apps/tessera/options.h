@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/App.hpp>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -10,6 +9,12 @@
 #include "base/vec.h"
 #include "brick/refine.h"
 #include "io/vdb_file.h"
+
+// CLI11's own header costs every source that includes it several seconds.
+namespace CLI {
+class App;
+class Validator;
+}  // namespace CLI
 
 namespace tessera {
 

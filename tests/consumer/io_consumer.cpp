@@ -1,14 +1,16 @@
-// The example of the README, as a project of its own: reads a mesh, resamples it and writes an OpenVDB file.
+// The example of the README, as a project of its own: reads a mesh, in a process that it may crash, resamples
+// it and writes an OpenVDB file.
 #include <cstdio>
 #include <numeric>
 
-#include "io/read_mesh.h"
+#include "io/isolated_reader.h"
 #include "io/vdb_file.h"
 #include "registry/registry.h"
 
 int main(int argc, char** argv) {
     if (argc != 3) return 2;
-    const tessera::MeshFile file = tessera::readMesh(argv[1], {}, {});
+    const tessera::IsolatedReader reader{TESSERA_PROGRAM, {"read-mesh"}, QUICK_READER};
+    const tessera::MeshFile file = tessera::readMeshIsolated(reader, argv[1], {}, {}, {});
     std::vector<int> fields(file.mesh.fields.size());
     std::iota(fields.begin(), fields.end(), 0);
 

@@ -22,6 +22,8 @@ namespace {
 using contract::LatticeCase;
 using contract::Subject;
 
+constexpr int kThinnest = 8;  // elements of a case through which a lattice of its own goes
+
 struct Arguments {
     std::vector<int> cells{16, 32, 64, 128};
     int formatCells = 16;
@@ -100,14 +102,11 @@ class Table {
         Row& row = rowOf(hardCase);
         ++row.cases;
         for (const int cells : arguments_.cells)
-            for (const LatticeCase& at : latticesOf(mesh, cells)) {
-                Measure measure(mesh, at, {});
-                for (const Subject& subject : algorithms_)
-                    sampleAndMeasure(hardCase, mesh, at, measure, subject, row);
-                if (cells > arguments_.formatCells || hardCase.isLarge) continue;
-                for (const Subject& subject : formats_)
-                    sampleAndMeasure(hardCase, mesh, at, measure, subject, row);
-            }
+            for (const LatticeCase& at : latticesOf(mesh, cells))
+                runLattice(hardCase, mesh, at, cells <= arguments_.formatCells && !hardCase.isLarge, row);
+        if (!hardCase.isLarge)
+            for (const LatticeCase& at : latticesThroughThinnest(mesh, kThinnest))
+                runLattice(hardCase, mesh, at, true, row);
         const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
         std::int64_t exceptions = 0;
         for (const auto& [name, tally] : row.bySubject) exceptions += tally.exceptions();
@@ -115,8 +114,17 @@ class Table {
                    elapsed.count());
     }
 
+    void runLattice(const HardCase& hardCase, const TetMesh& mesh, const LatticeCase& at, bool inAllFormats,
+                    Row& row) {
+        contract::Measure measure(mesh, at);
+        for (const Subject& subject : algorithms_)
+            sampleAndMeasure(hardCase, mesh, at, measure, subject, row);
+        if (!inAllFormats) return;
+        for (const Subject& subject : formats_) sampleAndMeasure(hardCase, mesh, at, measure, subject, row);
+    }
+
     void sampleAndMeasure(const HardCase& hardCase, const TetMesh& mesh, const LatticeCase& at,
-                          Measure& measure, const Subject& subject, Row& row) {
+                          contract::Measure& measure, const Subject& subject, Row& row) {
         const std::vector<int> fields = contract::allFields(mesh);
         const Block block = std::move(contract::sample(*subject.resampler, mesh, fields, at.lattice,
                                                        std::span(&at.box, 1), {subject.bindOptions(), 2})[0]);
@@ -142,16 +150,24 @@ class Table {
         return fmt::format("{} / {} / {} / {} | {:.2f}", r.holes, r.spill, r.overshoot, rest, r.worstRatio);
     }
 
+    /// The same for every algorithm, but that a large case is for some alone.
+    static std::int64_t pointsInMesh(const std::map<std::string, Tally>& bySubject) {
+        std::int64_t most = 0;
+        for (const auto& [name, tally] : bySubject) most = std::max(most, tally.report.inMesh);
+        return most;
+    }
+
     std::string caseTable() const {
-        std::string text = "| cases | what is hard |";
-        std::string rule = "|---|---|";
+        std::string text = "| cases | what is hard | points in the mesh |";
+        std::string rule = "|---|---|---:|";
         for (const Subject& subject : algorithms_) {
             text += fmt::format(" {} | worst |", subject.resampler->name());
             rule += "---|---:|";
         }
         text += fmt::format("\n{}\n", rule);
         for (const Row& row : rows_) {
-            text += fmt::format("| {} ({}) | {} |", row.name, row.cases, row.sentence);
+            text += fmt::format("| {} ({}) | {} | {} |", row.name, row.cases, row.sentence,
+                                pointsInMesh(row.bySubject));
             for (const Subject& subject : algorithms_) {
                 const auto found = row.bySubject.find(subject.name);
                 text += found == row.bySubject.end() ? std::string(" | |")
@@ -160,7 +176,7 @@ class Table {
             text += "\n";
         }
         std::map<std::string, Tally> all = total();
-        text += "| **all** | |";
+        text += fmt::format("| **all** | | {} |", pointsInMesh(all));
         for (const Subject& subject : algorithms_) text += fmt::format(" {} |", cell(all[subject.name]));
         text += "\n\nPoints checked:";
         for (const Subject& subject : algorithms_)
@@ -168,8 +184,10 @@ class Table {
                                 subject.resampler->name(), double(all[subject.name].report.points) * 1e-6,
                                 double(all[subject.name].report.inMesh) * 1e-6);
         text.back() = '.';
-        return text + fmt::format(" Lattices of {} cells along the longest side.\n",
-                                  fmt::join(arguments_.cells, ", "));
+        return text + fmt::format(
+                          " Lattices of {} cells along the longest side, and small ones through "
+                          "the centroids of each case's {} thinnest elements.\n",
+                          fmt::join(arguments_.cells, ", "), kThinnest);
     }
 
     std::string formatTable() const {

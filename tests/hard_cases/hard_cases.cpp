@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "hard_meshes.h"
+#include "mesh/element_class.h"
 #include "reference/fields.h"
 #include "reference/random.h"
 
@@ -314,6 +315,29 @@ std::vector<contract::LatticeCase> latticesOf(const TetMesh& mesh, int cells) {
     return {aligned, shifted(" half off", Vec3d(0.5)), third};
 }
 
+std::vector<contract::LatticeCase> latticesThroughThinnest(const TetMesh& mesh, int count) {
+    std::vector<std::pair<double, std::int64_t>> byAspect;
+    for (std::int64_t e = 0; e < mesh.elementCount(); ++e)
+        byAspect.emplace_back(aspectOf(cornersOf(mesh, e)), e);
+    std::sort(byAspect.begin(), byAspect.end());
+    const Vec3d size = mesh.boundsWorld().size();
+    const double spacing = std::max({size.x, size.y, size.z}) / 16;
+    std::vector<contract::LatticeCase> lattices;
+    for (const auto& [aspect, element] : byAspect) {
+        if (std::int64_t(lattices.size()) == count) break;
+        Vec3d centroid(0);
+        for (const auto node : mesh.tets[std::size_t(element)])
+            centroid += mesh.points[std::size_t(node)] * 0.25;
+        contract::LatticeCase at{"through element " + std::to_string(element),
+                                 Lattice::axisParallel(centroid, spacing),
+                                 {Vec3i(-3), Vec3i(4)}};
+        const Oracle oracle(mesh, at.lattice);
+        if (oracle.volumeSign(element) != 0 && oracle.contains(element, Vec3i(0)))
+            lattices.push_back(std::move(at));
+    }
+    return lattices;
+}
+
 std::int64_t wrongConstants(const TetMesh& mesh, const Block& block) {
     std::int64_t wrong = 0;
     int channel = 0;
@@ -325,24 +349,6 @@ std::int64_t wrongConstants(const TetMesh& mesh, const Block& block) {
                 wrong += block.coverage[i] != 0 && values[i] != expected;
         }
     return wrong;
-}
-
-Measure::Measure(const TetMesh& mesh, const contract::LatticeCase& at, const Execution& execution)
-    : mesh_(mesh),
-      at_(at),
-      execution_(execution),
-      oracle_(mesh, at.lattice),
-      fields_(contract::allFields(mesh)) {}
-
-ContractReport Measure::operator()(const contract::Subject& subject, const Block& block) {
-    const ContractBounds bounds = subject.bounds();
-    const auto known = std::find_if(references_.begin(), references_.end(), [&](const ReferenceBlock& r) {
-        return r.toleranceVoxels == bounds.spillVoxels;
-    });
-    if (known != references_.end()) return checkContract(block, *known, oracle_, fields_, bounds);
-    references_.push_back(
-        referenceBlock(oracle_, at_.box, {.toleranceVoxels = bounds.spillVoxels}, execution_));
-    return checkContract(block, references_.back(), oracle_, fields_, bounds);
 }
 
 }  // namespace tessera::hard_cases

@@ -30,23 +30,13 @@ const std::vector<HardCase>& hardCases();
 /// it is the first alone, with 128 the last.
 std::vector<contract::LatticeCase> latticesOf(const TetMesh& mesh, int cells);
 
+/// Lattices of 7^3 points, each with its point (0, 0, 0) at the centroid of one of the thinnest elements:
+/// other lattices hardly ever meet the inside of those. Flat elements, and those so thin that no double lies
+/// near enough to their centroid, are left out.
+std::vector<contract::LatticeCase> latticesThroughThinnest(const TetMesh& mesh, int count);
+
 /// Every covered value of a case of constant fields is that constant, rounded to float: the number that
 /// aren't.
 std::int64_t wrongConstants(const TetMesh& mesh, const Block& block);
-
-/// What several subjects are measured against on one mesh and lattice.
-class Measure {
-  public:
-    Measure(const TetMesh& mesh, const contract::LatticeCase& at, const Execution& execution);
-    ContractReport operator()(const contract::Subject& subject, const Block& block);
-
-  private:
-    const TetMesh& mesh_;
-    const contract::LatticeCase& at_;
-    Execution execution_;
-    Oracle oracle_;
-    std::vector<int> fields_;
-    std::vector<ReferenceBlock> references_;  ///< one for every tolerance asked for
-};
 
 }  // namespace tessera::hard_cases

@@ -29,6 +29,15 @@ const std::vector<Subject>& subjects() {
     return all;
 }
 
+constexpr const char* kThinTitles[] = {"Needles", "Spindles", "Slivers", "Caps"};
+
+/// A case of thin elements of one shape, which is named after their aspect ratio.
+bool isThinKind(const HardCase& hardCase) {
+    return hardCase.name.find("1e") != std::string::npos &&
+           std::any_of(std::begin(kThinTitles), std::end(kThinTitles),
+                       [&](const char* title) { return hardCase.name.starts_with(title); });
+}
+
 using OnCase = std::tuple<Subject, HardCase>;
 
 class HardCases : public testing::TestWithParam<OnCase> {
@@ -61,13 +70,28 @@ TEST_P(HardCases, MeetTheContract) {
     for (const LatticeCase& at : lattices()) {
         const std::vector<int> fields = contract::allFields(mesh_);
         const Block block = contract::sample(subject(), mesh_, fields, at.lattice, at.box);
-        const ContractReport report = Measure(mesh_, at, {})(subject(), block);
+        const ContractReport report = contract::Measure(mesh_, at)(subject(), block);
         EXPECT_TRUE(report.isClean())
             << hardCase().sentence << "; lattice " << at.name << "\n  " << report.summary();
         if (hardCase().isConstant) {
             EXPECT_EQ(wrongConstants(mesh_, block), 0) << at.name;
         }
     }
+}
+
+TEST_P(HardCases, ThinnestElementsAreMet) {
+    if (hardCase().isLarge) GTEST_SKIP() << "large";
+    const std::vector<LatticeCase> lattices = latticesThroughThinnest(mesh_, subject().isOnDevice() ? 2 : 8);
+    const std::vector<int> fields = contract::allFields(mesh_);
+    for (const LatticeCase& at : lattices) {
+        const Block block = contract::sample(subject(), mesh_, fields, at.lattice, at.box);
+        const ContractReport report = contract::Measure(mesh_, at)(subject(), block);
+        EXPECT_TRUE(report.isClean())
+            << hardCase().sentence << "; lattice " << at.name << "\n  " << report.summary();
+        EXPECT_GT(report.inMesh, 0) << at.name;
+        EXPECT_EQ(block.coverage[block.offset(Vec3i(0))], 1) << at.name;
+    }
+    EXPECT_TRUE(!lattices.empty() || !isThinKind(hardCase())) << "no thin element has a point inside";
 }
 
 /// On devices, of which none promises the bits of another: the same device, the same bits. The others' are
@@ -168,8 +192,6 @@ Block assembled(const LatticeCase& at, const std::vector<Block>& parts) {
     return whole;
 }
 
-constexpr const char* kThinTitles[] = {"Needles", "Spindles", "Slivers", "Caps"};
-
 class HardCaseHashes : public testing::TestWithParam<HardCase> {};
 
 TEST_P(HardCaseHashes, AreThoseListed) {
@@ -221,16 +243,12 @@ TEST(HardCaseList, HasEachNameOnceAndNoHashTooMany) {
 TEST(HardCaseList, ThinElementsAreAsThinAsTheirNamesSay) {
     int checked = 0;
     for (const HardCase& hardCase : hardCases()) {
-        const std::size_t digits = hardCase.name.find("1e");
-        const bool isThinKind =
-            std::any_of(std::begin(kThinTitles), std::end(kThinTitles),
-                        [&](const char* title) { return hardCase.name.starts_with(title); });
-        if (!isThinKind || digits == std::string::npos) continue;
+        if (!isThinKind(hardCase)) continue;
         const TetMesh mesh = hardCase.make();
         double least = 1;
         for (std::int64_t e = 0; e < mesh.elementCount(); ++e)
             least = std::min(least, aspectOf(cornersOf(mesh, e)));
-        const double named = std::pow(10.0, -std::stoi(hardCase.name.substr(digits + 2)));
+        const double named = std::pow(10.0, -std::stoi(hardCase.name.substr(hardCase.name.find("1e") + 2)));
         EXPECT_GT(least, 0.01 * named) << hardCase.name;
         EXPECT_LT(least, 10 * named) << hardCase.name;
         ++checked;
