@@ -882,8 +882,9 @@ class Reader(AppTest):
         while process.poll() is None:
             try:
                 for child in map(int, children.read_text().split()):
-                    os.kill(child, signal.SIGSTOP)
-                    return child
+                    if os.readlink(f"/proc/{child}/exe").endswith("tessera_read_mesh"):  # until then its parent waits for it
+                        os.kill(child, signal.SIGSTOP)
+                        return child
             except OSError:
                 pass  # it ended between two of these lines
         return None
