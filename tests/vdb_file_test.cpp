@@ -366,7 +366,10 @@ float pressures(int, const Vec3i& p, int) {
 // bytes but for the digest, with statistics and the table for delayed loading.
 TEST_F(VdbFileTest, OpenVdbWritesTheSameBytes) {
     for (const bool toHalf : {false, true}) {
-        BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10);
+        BrickResult result =
+            makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, [](int level, const Vec3i& p, int channel) {
+                return channel == 0 ? kNaN : valueAt(level, p, channel);
+            });  // a grid without values
         ExtensionPoints outside;
         outside.points = {{{-200, 3, 5}, 0, 0}, {{-1, -1, 0}, 2, 10}};
         outside.values.assign(20, 1.5f);
@@ -401,6 +404,18 @@ TEST_F(VdbFileTest, HalfFloatsReadBack) {
     const VdbFile read = readVdb(file("half.vdb"));
     EXPECT_TRUE(read.halfFloat);
     expectStored(read, 10, smallIntegers, coveredAt);
+}
+
+// A vector with a component that isn't finite is left out, and its others with it.
+TEST_F(VdbFileTest, ValuesThatAreLeftOutDontDecideOnHalfFloats) {
+    BrickResult result =
+        makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, [](int, const Vec3i& p, int channel) {
+            return p.x & 1 ? float(channel) : channel == 1 ? kNaN : channel == 2 ? 1e6f : 1.0f;
+        });
+    VdbWriteOptions options;
+    options.halfFloat = true;
+    EXPECT_TRUE(writeVdb(file("half.vdb"), kMixed, result, nullptr, nullptr, options, {}).notes.empty());
+    EXPECT_TRUE(findGrid<openvdb::Vec3SGrid>(file("half.vdb"), "U_level_0")->saveFloatAsHalf());
 }
 
 TEST_F(VdbFileTest, ValuesBeyondHalfFloatsStayFull) {

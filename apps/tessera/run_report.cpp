@@ -1,13 +1,12 @@
 #include "run_report.h"
 
 #include <fmt/format.h>
+
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
 
 #include "base/error.h"
+#include "commands.h"
 #include "io/atomic_file.h"
 #include "io/report_json.h"
 
@@ -193,8 +192,7 @@ void writeJson(const std::string& path, const Json& document) {
     // Field names come from files and need not be UTF-8.
     const std::string text = document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
     if (path == "-") {
-        if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-            throw IoError(fmt::format("standard output: {}", std::strerror(errno)));
+        printOut(text);
         return;
     }
     writeFileAtomically(path, text);

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <limits>
 #include <new>
+#include <optional>
 
 #include "base/error.h"
 #include "base/timer.h"
@@ -55,13 +56,15 @@ class IsolatedReading {
   private:
     ReportStart awaitAnswer(ReaderProcess& process);
     MeshFile takeMesh(ReaderProcess& process, const ReportStart& answer);
-    void awaitReport(ReaderProcess& process);
+    bool readQuickly(const std::string& executable, const std::vector<std::string>& request, MeshFile& mesh);
+    bool awaitReport(ReaderProcess& process);
     void checkTimes(double spentMs, const ReaderProcess& process) const;
     bool receive(int descriptor);
     bool isComplete() const;
     ReportStart start() const;
     [[noreturn]] void rethrow(ReaderOutcome outcome, const std::string& message) const;
     [[noreturn]] void failWithGarbage(const std::string& why) const;
+    [[noreturn]] void failWithEnd(const ProcessEnd& end) const;
 
     const std::string& path_;
     IsolationLimits given_, usual_, limits_;
@@ -78,6 +81,11 @@ ReportStart IsolatedReading::start() const {
 void IsolatedReading::failWithGarbage(const std::string& why) const {
     throw InputError(path_ + ": the reader went wrong and handed over no sound mesh (" + why +
                      "); the file is damaged, or hits a bug of the library that reads it");
+}
+
+void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
+    throw InputError(path_ + ": the reader " + end.words +
+                     "; the file is damaged, or hits a bug of the library that reads it");
 }
 
 bool IsolatedReading::isComplete() const {
@@ -118,16 +126,16 @@ void IsolatedReading::checkTimes(double spentMs, const ReaderProcess& process) c
                          (given_.processorSeconds > 0 ? ", the limit given" : usual));
 }
 
-void IsolatedReading::awaitReport(ReaderProcess& process) {
+/// False when the child closed its end before its report was whole.
+bool IsolatedReading::awaitReport(ReaderProcess& process) {
+    report_.clear();
     double spentMs = 0;
     Timer timer;
     while (true) {
         execution_.throwIfCancelled();
         const bool open = receive(process.reports());
-        if (isComplete()) return;
-        if (!open)
-            throw InputError(path_ + ": the reader " + process.describeEnd() +
-                             "; the file is damaged, or hits a bug of the library that reads it");
+        if (isComplete()) return true;
+        if (!open) return false;
         // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the reader's.
         spentMs += std::min(timer.restart(), 5.0 * kTickMs);
         checkTimes(spentMs, process);
@@ -160,9 +168,8 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
 }
 
 ReportStart IsolatedReading::awaitAnswer(ReaderProcess& process) {
-    report_.clear();
-    awaitReport(process);
-    return start();
+    if (awaitReport(process)) return start();
+    failWithEnd(process.describeEnd());
 }
 
 MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& answer) {
@@ -177,14 +184,31 @@ MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& an
     rethrow(answer.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
 }
 
+/// False when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks a
+/// library.
+bool IsolatedReading::readQuickly(const std::string& executable, const std::vector<std::string>& request,
+                                  MeshFile& mesh) {
+    std::optional<ReaderProcess> process;
+    try {
+        process.emplace(executable, request);
+    } catch (const IoError&) {
+        return false;
+    }
+    if (!awaitReport(*process)) {
+        const ProcessEnd end = process->describeEnd();
+        if (end.bySignal) failWithEnd(end);
+        return false;
+    }
+    if (start().outcome == ReaderOutcome::otherFormat) return false;
+    mesh = takeMesh(*process, start());
+    return true;
+}
+
 MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
     const std::vector<std::string> request =
         requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
-    if (!reader.quickExecutable.empty()) {
-        ReaderProcess quick(reader.quickExecutable, request);
-        const ReportStart answer = awaitAnswer(quick);
-        if (answer.outcome != ReaderOutcome::otherFormat) return takeMesh(quick, answer);
-    }
+    MeshFile mesh;
+    if (!reader.quickExecutable.empty() && readQuickly(reader.quickExecutable, request, mesh)) return mesh;
     std::vector<std::string> words = reader.arguments;
     words.insert(words.end(), request.begin(), request.end());
     ReaderProcess process(reader.executable, words);
@@ -199,7 +223,8 @@ std::string quickReaderBeside(const std::string& executable) {
     const fs::path directory = fs::canonical(executable, error).parent_path();
     for (const char* place : {"", TESSERA_READER_FROM_BINDIR}) {
         const fs::path candidate = directory / place / "tessera_read_mesh";
-        if (!error && ::access(candidate.c_str(), X_OK) == 0) return candidate.string();
+        if (!error && fs::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0)
+            return candidate.string();
     }
     return {};
 }

@@ -16,7 +16,8 @@ struct IsolatedReader {
     std::string executable;
     std::vector<std::string> arguments;
     /// One that is tried before it, as tessera_read_mesh: it reads the common formats alone (readCommonMesh),
-    /// and so starts ten times faster. It is given the request alone. Empty: none.
+    /// and so starts ten times faster. It is given the request alone. Empty: none; one that can't be used is
+    /// left out.
     std::string quickExecutable{};
 };
 
@@ -33,7 +34,7 @@ struct IsolationLimits {
 };
 
 /// Bounds for a mesh of this size on disk, its companion files included, each once: 640 MiB and 96 bytes a
-/// byte of file, at most three quarters of the memory here; 6 s of processor time and a second for every 4
+/// byte of file, at most three quarters of the memory here; 3 s of processor time and a second for every 4
 /// MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells in fewer
 /// bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK file
 /// declares. Throws InputError when the file is missing, empty or damaged at first sight.

@@ -106,7 +106,7 @@ class PackedGrid final : public Grid {
         if (bytes) bytes->value() += std::int64_t(packed_.size()) * bufferBytes();
         this->insertMeta(Grid::META_FILE_COMPRESSION,
                          openvdb::StringMetadata(openvdb::io::compressionToString(kVdbCompression)));
-        if (packed_.empty() || bufferBytes() == 0) return;
+        if (bufferBytes() == 0) return;
         openvdb::io::DelayedLoadMetadata places;
         places.resizeMask(packed_.size());
         places.resizeCompressedSize(packed_.size());

@@ -17,7 +17,7 @@ namespace {
 // element; a grid's point becomes five or six elements. The factors leave room for meshes that compress
 // better.
 constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytesPerItem = 700;
-constexpr double kFloorSeconds = 6, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
+constexpr double kFloorSeconds = 3, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
 // Others may have the processors, and disks may be slow.
 constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
 // Below, a file's own word on its cells is worth nothing: its size alone bounds what it may take.

@@ -122,13 +122,13 @@ class SpawnPlan {
     posix_spawnattr_t attributes_;
 };
 
-std::string describe(int status) {
+ProcessEnd describe(int status) {
     if (WIFEXITED(status))
-        return "ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")";
+        return {"ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")", false};
     const int number = WTERMSIG(status);
-    if (number == SIGKILL) return "was killed (signal 9), as the system does when memory runs out";
+    if (number == SIGKILL) return {"was killed (signal 9), as the system does when memory runs out", true};
     const char* name = sigdescr_np(number);
-    return "crashed (signal " + std::to_string(number) + (name ? std::string(", ") + name : "") + ")";
+    return {"crashed (signal " + std::to_string(number) + (name ? std::string(", ") + name : "") + ")", true};
 }
 
 }  // namespace
@@ -199,7 +199,7 @@ double ReaderProcess::processorSeconds() const {
     return double(time.tv_sec) + double(time.tv_nsec) * 1e-9;
 }
 
-std::string ReaderProcess::describeEnd() {
+ProcessEnd ReaderProcess::describeEnd() {
     // A process closes its files a moment before it can be reaped.
     for (int wait = 0; child_ >= 0 && wait < kEndMs; ++wait) {
         int status = 0;
@@ -212,7 +212,7 @@ std::string ReaderProcess::describeEnd() {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     kill();
-    return "ended without a result";
+    return {"ended without a result", false};
 }
 
 }  // namespace tessera

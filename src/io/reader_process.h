@@ -43,6 +43,12 @@ class SealedMemory {
     std::span<const std::byte> bytes_;
 };
 
+/// How a child ended.
+struct ProcessEnd {
+    std::string words;  ///< "crashed (signal 11, Segmentation fault)", "ended without a result (exit code 7)"
+    bool bySignal = false;
+};
+
 /// A running child with nothing but the two descriptors above; its standard streams lead nowhere, and it
 /// doesn't see the terminal's signals. It is killed and reaped when this object ends.
 class ReaderProcess {
@@ -59,7 +65,7 @@ class ReaderProcess {
     double processorSeconds() const;
     /// Says how a child ended that closed its reports: "crashed (signal 11, Segmentation fault)", "ended
     /// without a result (exit code 7)". Kills it if it hasn't ended after all.
-    std::string describeEnd();
+    ProcessEnd describeEnd();
 
   private:
     void kill();

@@ -8,14 +8,18 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kFixedWords = 5;
+constexpr std::size_t kFixedWords = 6;
+// The other program may be of another build: what they say to each other has a number, to be raised with each
+// change.
+constexpr const char* kProtocol = TESSERA_VERSION "/2";
+constexpr const char* kByItself = "the reader of meshes is started by tessera itself";
 
 template <class Number>
 Number parseNumber(const std::string& word) {
     Number value{};
     const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
     if (word.empty() || result.ec != std::errc() || result.ptr != word.data() + word.size())
-        throw InputError("the reader of meshes is started by tessera itself; '" + word + "' isn't a number");
+        throw InputError(std::string(kByItself) + "; '" + word + "' isn't a number");
     return value;
 }
 
@@ -24,21 +28,25 @@ Number parseNumber(const std::string& word) {
 std::vector<std::string> requestWords(const ReaderRequest& request) {
     static_assert(sizeof(ReadOptions) == sizeof(std::vector<std::string>) + 8,
                   "a new member of ReadOptions needs its word here and in parseRequest");
-    std::vector<std::string> words{std::to_string(request.parent), std::to_string(request.memoryBytes),
-                                   std::to_string(request.threads), std::to_string(request.options.timeStep),
+    std::vector<std::string> words{kProtocol,
+                                   std::to_string(request.parent),
+                                   std::to_string(request.memoryBytes),
+                                   std::to_string(request.threads),
+                                   std::to_string(request.options.timeStep),
                                    request.path};
     words.insert(words.end(), request.options.fields.begin(), request.options.fields.end());
     return words;
 }
 
 ReaderRequest parseRequest(std::span<const std::string> words) {
-    if (words.size() < kFixedWords) throw InputError("the reader of meshes is started by tessera itself");
+    if (words.size() < kFixedWords || words[0] != kProtocol)
+        throw InputError(std::string(kByItself) + ", of the same version");
     ReaderRequest request;
-    request.parent = parseNumber<std::int64_t>(words[0]);
-    request.memoryBytes = parseNumber<std::int64_t>(words[1]);
-    request.threads = parseNumber<int>(words[2]);
-    request.options.timeStep = parseNumber<int>(words[3]);
-    request.path = words[4];
+    request.parent = parseNumber<std::int64_t>(words[1]);
+    request.memoryBytes = parseNumber<std::int64_t>(words[2]);
+    request.threads = parseNumber<int>(words[3]);
+    request.options.timeStep = parseNumber<int>(words[4]);
+    request.path = words[5];
     request.options.fields.assign(words.begin() + kFixedWords, words.end());
     return request;
 }

@@ -24,7 +24,7 @@ enum class ReaderOutcome : std::uint32_t {
 
 /// Stands before the message or the mesh in the pipe.
 struct ReportStart {
-    static constexpr std::uint32_t kMagic = 0x54737372;
+    static constexpr std::uint32_t kMagic = 0x54737373;
     std::uint32_t magic = kMagic;
     ReaderOutcome outcome = ReaderOutcome::otherError;
     std::uint64_t bytes = 0;  ///< that follow

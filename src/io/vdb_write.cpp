@@ -115,19 +115,23 @@ class ExtendedTiles {
         tiles_.erase(found);
         return points;
     }
-    // Tiles that nobody took, without a point of the mesh.
-    std::vector<OutputTile> rest(int channels) const {
-        std::vector<OutputTile> tiles;
-        for (const auto& [origin, points] : tiles_) {
-            OutputTile& tile = tiles.emplace_back();
-            tile.origin = {origin.x(), origin.y(), origin.z()};
-            tile.owned = std::make_unique<float[]>(std::size_t(channels) * kTilePoints);
-            tile.values = tile.owned.get();
+    // Calls visit with the tiles that nobody took, without a point of the mesh, in batches.
+    template <class Visit>
+    void forEachOther(int channels, const Visit& visit) {
+        while (!tiles_.empty()) {
+            std::vector<OutputTile> batch;
+            for (auto tile = tiles_.begin(); tile != tiles_.end() && batch.size() < kBatchTiles; ++tile) {
+                OutputTile& made = batch.emplace_back();
+                made.origin = {tile->first.x(), tile->first.y(), tile->first.z()};
+                made.owned = std::make_unique<float[]>(std::size_t(channels) * kTilePoints);
+                made.values = made.owned.get();
+            }
+            visit(batch);  // which takes their points
         }
-        return tiles;
     }
 
   private:
+    static constexpr std::size_t kBatchTiles = 1024;
     std::map<openvdb::Coord, std::vector<ExtendedPoint>> tiles_;
 };
 
@@ -306,30 +310,34 @@ std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std
         } else {
             forEachLevelTile(result.tree, result.store, level, execution, sink);
         }
-        sink(outside.rest(result.store.channels()));
+        outside.forEachOther(result.store.channels(), sink);
     }
     return all;
 }
 
-// The largest magnitude of some channels, in the mesh and beside it.
+// The largest magnitude of a plan's values, in the mesh and beside it. As in the grid, a vector that isn't
+// finite as a whole doesn't count.
 float largestMagnitude(const BrickStore& store, const ExtensionPoints* extension, const GridPlan& plan) {
     float largest = 0;
-    const auto take = [&](float value) {
-        if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+    const auto take = [&](const auto& component) {
+        float magnitude = 0;
+        for (int c = plan.firstChannel; c < plan.firstChannel + plan.components; ++c) {
+            if (!std::isfinite(component(c))) return;
+            magnitude = std::max(magnitude, std::abs(component(c)));
+        }
+        largest = std::max(largest, magnitude);
     };
-    for (int c = plan.firstChannel; c < plan.firstChannel + plan.components; ++c) {
-        for (std::size_t leaf = 0; leaf < store.leafCount(); ++leaf) {
-            for (int t = 0; t < store.tileCount(); ++t) {
-                const Tile* tile = store.tile(leaf, t);
-                for (int i = 0; tile && i < kTilePoints; ++i) {
-                    if (tile->covered(i)) take(tile->channel(c)[i]);
-                }
+    for (std::size_t leaf = 0; leaf < store.leafCount(); ++leaf) {
+        for (int t = 0; t < store.tileCount(); ++t) {
+            const Tile* tile = store.tile(leaf, t);
+            for (int i = 0; tile && i < kTilePoints; ++i) {
+                if (tile->covered(i)) take([&](int c) { return tile->channel(c)[i]; });
             }
         }
-        if (!extension) continue;
-        for (const ExtensionPoint& point : extension->points)
-            take(extension->values[point.firstValue + std::size_t(c)]);
     }
+    if (!extension) return largest;
+    for (const ExtensionPoint& point : extension->points)
+        take([&](int c) { return extension->values[point.firstValue + std::size_t(c)]; });
     return largest;
 }
 
