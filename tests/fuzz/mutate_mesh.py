@@ -358,7 +358,9 @@ def damage_counts(file, rng):
     if key == "Extent":
         damage_extent(file, rng)
     else:
-        file.piece[key] = near(rng, int(file.piece[key])) if rng.random() < 0.9 else rng.choice(["", "six", "1e3", "0x10", " 8 ", "8.5", "nan"])
+        before = str(file.piece[key])
+        number = int(before) if before.lstrip("-").isdecimal() else 0  # it may have been damaged already
+        file.piece[key] = near(rng, number) if rng.random() < 0.9 else rng.choice(["", "six", "1e3", "0x10", " 8 ", "8.5", "nan"])
 
 
 def damage_extent(file, rng):
