@@ -218,7 +218,7 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
     command
         .add_option(
             "--max-read-time", a.maxSeconds,
-            "seconds that reading may take (default: 6 of processor time and 60 until the end, and more "
+            "seconds that reading may take (default: 3 of processor time and 60 until the end, and more "
             "for large files); not with --reader in-process")
         ->group(group);
     if (!command.get_option_no_throw("--max-memory"))

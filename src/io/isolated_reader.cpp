@@ -54,9 +54,9 @@ class IsolatedReading {
     MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
 
   private:
-    ReportStart awaitAnswer(ReaderProcess& process);
-    MeshFile takeMesh(ReaderProcess& process, const ReportStart& answer);
-    bool readQuickly(const std::string& executable, const std::vector<std::string>& request, MeshFile& mesh);
+    MeshFile takeMesh(ReaderProcess& process);
+    std::optional<MeshFile> readQuickly(const std::string& executable,
+                                        const std::vector<std::string>& request);
     bool awaitReport(ReaderProcess& process);
     void checkTimes(double spentMs, const ReaderProcess& process) const;
     bool receive(int descriptor);
@@ -167,12 +167,9 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
     }
 }
 
-ReportStart IsolatedReading::awaitAnswer(ReaderProcess& process) {
-    if (awaitReport(process)) return start();
-    failWithEnd(process.describeEnd());
-}
-
-MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& answer) {
+/// The mesh, or the error, of a report that is whole.
+MeshFile IsolatedReading::takeMesh(ReaderProcess& process) {
+    const ReportStart answer = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
     try {
         if (answer.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
@@ -184,35 +181,37 @@ MeshFile IsolatedReading::takeMesh(ReaderProcess& process, const ReportStart& an
     rethrow(answer.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
 }
 
-/// False when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks a
-/// library.
-bool IsolatedReading::readQuickly(const std::string& executable, const std::vector<std::string>& request,
-                                  MeshFile& mesh) {
+/// Nothing when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks
+/// a library.
+std::optional<MeshFile> IsolatedReading::readQuickly(const std::string& executable,
+                                                     const std::vector<std::string>& request) {
     std::optional<ReaderProcess> process;
     try {
         process.emplace(executable, request);
     } catch (const IoError&) {
-        return false;
+        return std::nullopt;
     }
     if (!awaitReport(*process)) {
         const ProcessEnd end = process->describeEnd();
         if (end.bySignal) failWithEnd(end);
-        return false;
+        return std::nullopt;
     }
-    if (start().outcome == ReaderOutcome::otherFormat) return false;
-    mesh = takeMesh(*process, start());
-    return true;
+    if (start().outcome == ReaderOutcome::otherFormat) return std::nullopt;
+    return takeMesh(*process);
 }
 
 MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
     const std::vector<std::string> request =
         requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
-    MeshFile mesh;
-    if (!reader.quickExecutable.empty() && readQuickly(reader.quickExecutable, request, mesh)) return mesh;
+    if (!reader.quickExecutable.empty()) {
+        if (std::optional<MeshFile> mesh = readQuickly(reader.quickExecutable, request))
+            return *std::move(mesh);
+    }
     std::vector<std::string> words = reader.arguments;
     words.insert(words.end(), request.begin(), request.end());
     ReaderProcess process(reader.executable, words);
-    return takeMesh(process, awaitAnswer(process));
+    if (!awaitReport(process)) failWithEnd(process.describeEnd());
+    return takeMesh(process);
 }
 
 }  // namespace

@@ -2,11 +2,13 @@
 
 #include <openvdb/io/Compression.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <ostream>
 #include <streambuf>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -68,12 +70,9 @@ class PackedLeaf {
         const bool one = kind() == NO_MASK_AND_ONE_INACTIVE_VAL || kind() == MASK_AND_ONE_INACTIVE_VAL;
         const bool selects =
             kind() == MASK_AND_NO_INACTIVE_VALS || kind() == MASK_AND_ONE_INACTIVE_VAL || two;
-        return std::int64_t(size_ - kMaskBytes - 1 -
-                            (two   ? 2
-                             : one ? 1
-                                   : 0) *
-                                sizeof(Value) -
-                            (selects ? kMaskBytes : 0));
+        const std::size_t inactiveValues = two ? 2 : one ? 1 : 0;
+        const std::size_t head = kMaskBytes + 1 + inactiveValues * sizeof(Value) + (selects ? kMaskBytes : 0);
+        return std::int64_t(size_ - head);
     }
 
   private:
