@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 
 #include "algorithm_list.h"
@@ -103,47 +102,6 @@ class CompareRun {
 };
 
 }  // namespace
-
-void addCompareOptions(CLI::App& command, CompareArguments& a) {
-    command.add_option("mesh", a.meshes, "mesh files")->required();
-    command.add_option(
-        "--algorithms", a.algorithms,
-        "names with commas between them, each with a target if wanted: software,slicing:osmesa; "
-        "the first is what the others are compared with (default: all that can run here)");
-    addBindOptions(command, a.algorithm);
-    auto* resolution =
-        command
-            .add_option("--resolution", a.resolution, "lattice points along the longest axis (default: 128)")
-            ->check(CLI::Range(2, 1 << 20));
-    command.add_option("--spacing", a.spacing, "spacing of the lattice, in world units")
-        ->check(CLI::PositiveNumber)
-        ->excludes(resolution);
-    command.add_option("--field", a.fields, "fields to sample: a,b (default: all)");
-    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
-        ->check(CLI::Range(1, 1000))
-        ->capture_default_str();
-    command
-        .add_option("--box", a.boxEdge,
-                    "points along the edge of the boxes sampled at once; smaller ones are taken when many "
-                    "channels need it")
-        ->check(CLI::Range(16, 512))
-        ->capture_default_str();
-    command.add_flag("--markdown", a.markdown, "print one table in Markdown, one row a mesh and algorithm");
-    command.add_option("--time-step", a.timeStep,
-                       "files with several steps: which one, counted from 0 (default: the last)");
-    addRepairOptions(command, a.repair);
-    addCommonOptions(command, a.common);
-    command.footer(
-        "Samples the mesh by each algorithm on one lattice and compares coverage, values and times; checks "
-        "every "
-        "sample against the mesh. Exit\ncode 1 when coverage differs away from the mesh boundary or a sample "
-        "is "
-        "wrong.\n"
-        "Examples:\n  tessera compare mesh.vtu\n"
-        "  tessera compare mesh.vtu --algorithms software,slicing,hybrid --resolution 256 --field pressure\n"
-        "  tessera compare mesh.vtu --algorithms software,slicing --sample-format r8 --json report.json\n"
-        "  tessera compare *.vtu --markdown");
-}
 
 int runCompare(const CompareArguments& arguments) {
     checkOutputPaths(arguments.meshes, {{"--json", arguments.common.jsonPath}});

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 
 #include "base/error.h"
@@ -101,17 +100,6 @@ Json showMesh(const InfoArguments& arguments, Session& session) {
 }
 
 }  // namespace
-
-void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
-    command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote");
-    command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
-    command.add_option("--time-step", arguments.timeStep,
-                       "files with several steps: which one, counted from 0 (default: the last)");
-    addRepairOptions(command, arguments.repair);
-    addCommonOptions(command, arguments.common);
-    command.footer(
-        "Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -\n  tessera info --gl");
-}
 
 int runInfo(const InfoArguments& arguments) {
     if (arguments.path.empty() && !arguments.gl) throw InputError("info needs a file, or --gl");

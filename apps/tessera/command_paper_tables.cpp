@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -275,28 +274,6 @@ class PaperTables {
 };
 
 }  // namespace
-
-void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
-    command.add_option("mesh", a.mesh, "mesh file; the paper's is the bluntfin")->required();
-    addBindOptions(command, a.algorithm);
-    command.add_option("--field", a.field,
-                       "the field to sample (default: the first scalar field of the points)");
-    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
-        ->check(CLI::Range(1, 1000))
-        ->capture_default_str();
-    command
-        .add_option("--max-size", a.maxSize,
-                    "leave out grids with more points than this along an axis (there are 128 to 1024)")
-        ->check(CLI::Range(128, 1024))
-        ->capture_default_str();
-    addCommonOptions(command, a.common);
-    command.footer(
-        "Times the algorithms on the mesh, its double (mirrored at a plane perpendicular to y) and its "
-        "quadruple (y "
-        "and z), on the grids of Weiler and\nErtl 2001, and prints their figures 9 to 11 beside.\n"
-        "Examples:\n  tessera paper-tables bluntfin.vtu\n"
-        "  tessera paper-tables bluntfin.vtu --classification published --max-size 256 --json tables.json");
-}
 
 int runPaperTables(const PaperTablesArguments& arguments) {
     checkOutputPaths({arguments.mesh}, {{"--json", arguments.common.jsonPath}});

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -144,33 +143,6 @@ ValueRange shownRange(const ScalarImage& image) {
 }
 
 }  // namespace
-
-void addPictureOptions(CLI::App& command, PictureArguments& a) {
-    command.add_option("vdb", a.input, "a .vdb file that tessera wrote (layout levels)")->required();
-    command.add_option("-o,--output", a.output, "the .png file")->required();
-    command.add_option("--field", a.field, "the field (default: the first)");
-    command
-        .add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")
-        ->check(CLI::Range(0, 8));
-    command.add_option("--axis", a.axis, "the slice is normal to this axis")
-        ->check(CLI::IsMember({"x", "y", "z"}))
-        ->capture_default_str();
-    command.add_option("--at", a.at, "where along that axis, world units (default: the middle)");
-    command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
-    command.add_option("--range", a.range,
-                       "values a,b at the ends of the colour map (default: those of the slice)");
-    command.add_option("--mesh", a.mesh,
-                       "the mesh file: draws up to the mesh's surface instead of whole voxels");
-    command.add_option("--pixels", a.pixels, "along the longer edge")
-        ->check(CLI::Range(16, 8192))
-        ->capture_default_str();
-    command.add_flag("--bricks", a.bricks, "draw the edges of the bricks");
-    addCommonOptions(command, a.common);
-    command.footer(
-        "Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
-        "  tessera picture flow.vdb -o near.png --field velocity --bounds -1,-1,-1,1,1,1 --bricks --mesh "
-        "flow.vtu");
-}
 
 int runPicture(const PictureArguments& arguments) {
     checkOutputPaths({arguments.input, arguments.mesh},

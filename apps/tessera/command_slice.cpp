@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -333,64 +332,6 @@ Json SliceRun::report() const {
 }
 
 }  // namespace
-
-void addSliceOptions(CLI::App& command, SliceArguments& a) {
-    const std::string where = "Where to cut", what = "What to write";
-    command.add_option("mesh", a.input, "a mesh file")->required();
-    command
-        .add_option("-o,--output", a.output,
-                    "a .exr file (32-bit floats: a channel for every component of every field, and "
-                    "coverage) or a .png file (one field in colours, with a legend)")
-        ->required();
-    command
-        .add_option("--origin", a.origin,
-                    "a point x,y,z of the plane (default: the middle of the mesh's box)")
-        ->group(where);
-    command.add_option("--normal", a.normal, "the plane's normal a,b,c, of any length")
-        ->capture_default_str()
-        ->group(where);
-    command
-        .add_option(
-            "--up", a.up,
-            "what points up in the picture: its projection onto the plane (default: y for a normal "
-            "nearest to the z axis, else z; so axes right and up are x,y for z, x,z for y, y,z for x)")
-        ->group(where);
-    command
-        .add_option(
-            "--size", a.size,
-            "width and height w,h, or one length s for both, around the origin, in world units (default: as "
-            "large as the cut)")
-        ->group(where);
-    command.add_option("--resolution", a.resolution, "pixels along the longer edge")
-        ->check(CLI::Range(1, kLargestCutResolution))
-        ->capture_default_str()
-        ->group(where);
-    command
-        .add_option("--time-step", a.timeStep,
-                    "files with several steps: which one, counted from 0 (default: the last)")
-        ->group(where);
-    command
-        .add_option("--field", a.fields,
-                    "fields to sample: a,b=newname,... (default: all for .exr, the first for .png)")
-        ->group(what);
-    command
-        .add_option("--component", a.component,
-                    ".png: component of a vector, counted from 0 (default: its length)")
-        ->check(CLI::Range(0, 8))
-        ->group(what);
-    command
-        .add_option("--range", a.range,
-                    ".png: values a,b at the ends of the colour map (default: those of the cut)")
-        ->group(what);
-    addAlgorithmOptions(command, a.algorithm);
-    addRepairOptions(command, a.repair);
-    addCommonOptions(command, a.common);
-    command.footer(
-        "Pixels outside the mesh hold 0 and coverage 0; a value that isn't finite is NaN.\n"
-        "Examples:\n  tessera slice flow.vtu -o cut.exr --origin 0,0,0.5 --normal 1,1,0\n"
-        "  tessera slice flow.vtu -o cut.png --normal 0,1,0 --field pressure --range 0,2\n"
-        "  tessera slice flow.vtu -o near.exr --origin 1,2,0 --normal 0,0,1 --size 0.5 --resolution 4096");
-}
 
 int runSlice(const SliceArguments& arguments) {
     return SliceRun(arguments).run();

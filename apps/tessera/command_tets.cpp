@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-
 #include "base/timer.h"
 #include "commands.h"
 #include "import_mesh.h"
@@ -10,16 +8,6 @@
 #include "report_text.h"
 
 namespace tessera {
-
-void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
-    command.add_option("mesh", arguments.input, "mesh file")->required();
-    command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra")->required();
-    command.add_option("--time-step", arguments.timeStep,
-                       "files with several steps: which one, counted from 0 (default: the last)");
-    addRepairOptions(command, arguments.repair);
-    addCommonOptions(command, arguments.common);
-    command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
-}
 
 int runTets(const TetsArguments& arguments) {
     checkOutputPaths({arguments.input},

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 
@@ -11,6 +10,7 @@
 #include "commands.h"
 #include "import_mesh.h"
 #include "io/vdb_file.h"
+#include "output_paths.h"
 #include "registry/registry.h"
 #include "report_text.h"
 
@@ -124,23 +124,8 @@ std::string sampleText(const SampleCheck& check) {
 
 }  // namespace
 
-void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
-    command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")
-        ->required();
-    command.add_option("vdb", arguments.vdbPath, "the .vdb file (layout levels)")->required();
-    command.add_option("--time-step", arguments.timeStep,
-                       "files with several steps: which one, counted from 0 (default: the last)");
-    command.add_option("--samples", arguments.samples, "stored voxels to evaluate one by one")
-        ->check(CLI::Range(0, 1000000000))
-        ->capture_default_str();
-    addCommonOptions(command, arguments.common);
-    command.footer(
-        "Measures the error anew and compares it with what the file says. Exit code 2 when a claim does not "
-        "hold.\n"
-        "Example:\n  tessera verify mesh.vtu out.vdb");
-}
-
 int runVerify(const VerifyArguments& arguments) {
+    checkOutputPaths({arguments.meshPath, arguments.vdbPath}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     VdbFile file = readVdb(arguments.vdbPath);
     if (file.layout != VdbLayout::levels)

@@ -95,14 +95,6 @@ struct PaperTablesArguments {
     int runs = 3, maxSize = 1024;
 };
 
-void addInfoOptions(CLI::App& command, InfoArguments& arguments);
-void addVerifyOptions(CLI::App& command, VerifyArguments& arguments);
-void addTetsOptions(CLI::App& command, TetsArguments& arguments);
-void addPictureOptions(CLI::App& command, PictureArguments& arguments);
-void addSliceOptions(CLI::App& command, SliceArguments& arguments);
-void addCompareOptions(CLI::App& command, CompareArguments& arguments);
-void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& arguments);
-
 /// Each returns the exit code and throws the library's errors.
 int runResample(const ResampleArguments& arguments);
 int runInfo(const InfoArguments& arguments);

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <utility>
 
 #include "base/error.h"
@@ -85,36 +84,6 @@ std::string keptText(const RepairReport& r) {
 }
 
 }  // namespace
-
-void addRepairOptions(CLI::App& command, RepairArguments& a) {
-    const std::string group = "Repair of the mesh";
-    auto* repair =
-        command
-            .add_flag("--repair", a.repair,
-                      "collapse degenerate elements (needles, spindles, slivers, caps, flat ones) into their "
-                      "neighbours and turn inverted ones; without it the mesh is taken as it is")
-            ->group(group);
-    command
-        .add_option("--repair-aspect", a.aspect,
-                    "elements are degenerate whose smallest height over their longest edge is below this "
-                    "(default: 1e-6)")
-        ->check(numbersWithin(1e-12, 0.5))
-        ->needs(repair)
-        ->group(group);
-    command
-        .add_option("--repair-angle", a.angle,
-                    "dihedral angles above this, in degrees, are large: their number tells the classes apart "
-                    "(default: 150)")
-        ->check(numbersWithin(90, 179))
-        ->needs(repair)
-        ->group(group);
-    command
-        .add_option("--repair-max-volume-loss", a.maxVolumeLoss,
-                    "share of the volume, such as 1e-4 or 0.01%, that removing elements may change "
-                    "(default: 1e-6); elements that need more stay, and a warning counts them")
-        ->needs(repair)
-        ->group(group);
-}
 
 std::optional<RepairOptions> repairOptions(const RepairArguments& a) {
     if (!a.repair) return std::nullopt;

@@ -16,8 +16,6 @@ struct ImportedMesh : MeshFile {
     double repairMs = 0;
 };
 
-/// Adds --repair and its options.
-void addRepairOptions(CLI::App& command, RepairArguments& arguments);
 /// Nothing without --repair. Throws InputError for values out of range.
 std::optional<RepairOptions> repairOptions(const RepairArguments& arguments);
 

@@ -2,22 +2,18 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <limits>
 #include <new>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
-#include "commands.h"
+#include "command_line.h"
 #include "interrupt.h"
 #include "io/atomic_file.h"
-#include "output_paths.h"
 #include "report_text.h"
 
 namespace {
@@ -28,52 +24,6 @@ constexpr int kExitBadInput = 2;
 /// One line on standard error, whatever the message holds. Where it can't be written the exit code has to do.
 void printError(const char* message) {
     std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
-}
-
-struct Arguments {
-    tessera::ResampleArguments resample;
-    tessera::InfoArguments info;
-    tessera::VerifyArguments verify;
-    tessera::TetsArguments tets;
-    tessera::PictureArguments picture;
-    tessera::CompareArguments compare;
-    tessera::PaperTablesArguments paperTables;
-    tessera::SliceArguments slice;
-};
-
-void describe(CLI::App& app, Arguments& arguments) {
-    app.name("tessera");
-    app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
-    app.set_help_flag("-h,--help", "print this help and exit");
-    app.require_subcommand(1);
-    app.get_formatter()->column_width(34);
-    app.footer(
-        "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
-        "codes: 0 done, "
-        "2 bad input or usage, 1 any other failure, 130 interrupted.");
-    tessera::addResampleOptions(
-        *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
-        arguments.resample);
-    tessera::addInfoOptions(
-        *app.add_subcommand("info", "what a mesh file or a .vdb file holds, or what OpenGL there is"),
-        arguments.info);
-    tessera::addVerifyOptions(
-        *app.add_subcommand("verify", "check a .vdb file's error report against its mesh"), arguments.verify);
-    tessera::addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"),
-                            arguments.tets);
-    tessera::addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
-                               arguments.picture);
-    tessera::addCompareOptions(
-        *app.add_subcommand("compare", "several algorithms on one lattice: coverage, values, times"),
-        arguments.compare);
-    tessera::addPaperTablesOptions(
-        *app.add_subcommand("paper-tables", "the algorithms' times beside those of the paper they come from"),
-        arguments.paperTables);
-    tessera::addSliceOptions(*app.add_subcommand("slice", "cut a mesh with any plane: a float EXR or a .png"),
-                             arguments.slice);
-    for (CLI::App* command : app.get_subcommands({}))
-        if (CLI::Option* step = command->get_option_no_throw("--time-step"))
-            step->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
 /// What is printed must never reach a file that happens to get the number of a closed stream: such streams
@@ -92,19 +42,17 @@ int codeAfterOutput(int code) {
     return code == 0 ? kExitFailure : code;
 }
 
-int run(const CLI::App& app, const Arguments& arguments) {
-    if (app.got_subcommand("resample")) return tessera::runResample(arguments.resample);
-    if (app.got_subcommand("info")) return tessera::runInfo(arguments.info);
-    if (app.got_subcommand("verify")) {
-        const tessera::VerifyArguments& verify = arguments.verify;
-        tessera::checkOutputPaths({verify.meshPath, verify.vdbPath}, {{"--json", verify.common.jsonPath}});
-        return tessera::runVerify(verify);
-    }
-    if (app.got_subcommand("tets")) return tessera::runTets(arguments.tets);
-    if (app.got_subcommand("slice")) return tessera::runSlice(arguments.slice);
-    if (app.got_subcommand("compare")) return tessera::runCompare(arguments.compare);
-    if (app.got_subcommand("paper-tables")) return tessera::runPaperTables(arguments.paperTables);
-    return tessera::runPicture(arguments.picture);
+int run(const tessera::CommandLine& line) {
+    if (line.command == "resample") return tessera::runResample(line.resample);
+    if (line.command == "info") return tessera::runInfo(line.info);
+    if (line.command == "verify") return tessera::runVerify(line.verify);
+    if (line.command == "tets") return tessera::runTets(line.tets);
+    if (line.command == "slice") return tessera::runSlice(line.slice);
+    if (line.command == "compare") return tessera::runCompare(line.compare);
+    if (line.command == "paper-tables") return tessera::runPaperTables(line.paperTables);
+    if (line.command == "picture") return tessera::runPicture(line.picture);
+    tessera::printOut(line.text);
+    return 0;
 }
 
 /// What the process that reads a mesh runs; another tessera process is its only user.
@@ -145,23 +93,8 @@ int main(int argc, char** argv) {
     tessera::noteStart();
     tessera::installInterruptHandlers();
     std::set_terminate(endOutOfMemory);
-    CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
-    Arguments arguments;
-    describe(app, arguments);
     try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) {  // --help, --version
-            std::ostringstream text;
-            app.exit(error, text);
-            tessera::printOut(text.str());
-            return codeAfterOutput(0);
-        }
-        printError(fmt::format("{} (tessera --help tells more)", error.what()).c_str());
-        return kExitBadInput;
-    }
-    try {
-        return codeAfterOutput(run(app, arguments));
+        return codeAfterOutput(run(tessera::parseCommandLine(argc, argv)));
     } catch (const tessera::Cancelled&) {
         printError("interrupted; no unfinished file is left");
         return 128 + tessera::interruptSignal();

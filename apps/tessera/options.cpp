@@ -2,14 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include "base/error.h"
-#include "import_mesh.h"
 
 namespace tessera {
 
@@ -47,102 +45,6 @@ void require(bool holds, const std::string& message) {
 void requirePositive(const std::string& option, double value) {
     require(std::isfinite(value) && value > 0,
             fmt::format("{}: expected a number above 0, got {}", option, value));
-}
-
-void addRefineOptions(CLI::App& command, ResampleArguments& a) {
-    const std::string group = "Where to sample how finely";
-    a.common.reader.memoryBoundsRun = true;
-    command
-        .add_option(
-            "--refine", a.refine,
-            "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
-            "the measured error is within --max-error")
-        ->check(CLI::IsMember({"uniform", "element-size", "error"}))
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--resolution", a.resolution,
-                    "lattice points along the longest axis, at the finest level")
-        ->group(group);
-    command.add_option("--spacing", a.spacing, "spacing of the finest level, in world units")->group(group);
-    command
-        .add_option("--samples-per-element", a.samplesPerElement,
-                    "element-size: samples along a typical element edge")
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--max-levels", a.maxLevels,
-                    "levels of spacing at most, each twice the one below (default: 8; for error no bound)")
-        ->group(group);
-    command
-        .add_option("--max-error", a.maxError,
-                    "error: bound in field units, or a share of each field's range such as 1%")
-        ->group(group);
-    command.add_option("--error-measure", a.errorMeasure, "error: which figure the bound holds for")
-        ->check(CLI::IsMember({"max", "rms"}))
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--error-field", a.errorFields,
-                    "error: fields a,b that the bound holds for (default: all point fields chosen)")
-        ->group(group);
-    command.add_option("--brick-size", a.brickSize, "cells along a brick's edge: 8, 16, 32 or 64")
-        ->capture_default_str()
-        ->group(group);
-    command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")
-        ->group(group);
-    command.add_option("--like", a.like, "use the lattice (origin and finest spacing) of this .vdb file")
-        ->group(group);
-    command
-        .add_option("--max-voxels", a.maxVoxels,
-                    "bound on stored voxels, e.g. 500M (default: from the memory there is)")
-        ->group(group);
-    command
-        .add_option(
-            "--max-memory", a.common.reader.maxMemory,
-            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G; with "
-            "--reader in-process reading itself has no bound")
-        ->group(group);
-    command
-        .add_flag("--dry-run", a.dryRun,
-                  "print voxels, bytes and predicted time of each layout; write nothing")
-        ->group(group);
-}
-
-void addOutputOptions(CLI::App& command, ResampleArguments& a) {
-    const std::string group = "What to write";
-    command.add_option("--field", a.fields, "fields to sample: a,b=newname,... (default: all)")->group(group);
-    command
-        .add_option("--layout", a.layout,
-                    "levels: one grid a field and level. flat: one grid a field at the finest spacing")
-        ->check(CLI::IsMember({"levels", "flat"}))
-        ->capture_default_str()
-        ->group(group);
-    command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
-    command
-        .add_option("--extend", a.extendLayers,
-                    "layers of voxels written outside the mesh, with the value at the nearest mesh point "
-                    "(default: 1 for "
-                    "the flat layout, which Blender and Houdini interpolate without looking at the mesh; 0 "
-                    "for levels)")
-        ->group(group);
-    command.add_option("--background", a.background, "value of voxels that are not stored")
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--unit-scale", a.unitScale,
-                    "file units per world unit (default: 1, or a power of ten when voxels are tiny)")
-        ->group(group);
-    command
-        .add_option("--up-axis", a.upAxis,
-                    "turn the grid so that this axis of the file points up: keep, y or z")
-        ->check(CLI::IsMember({"keep", "y", "z"}))
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--time-step", a.timeStep,
-                    "files with several steps: which one, counted from 0 (default: the last)")
-        ->group(group);
 }
 
 void checkRanges(const ResampleArguments& a) {
@@ -204,92 +106,11 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     return r;
 }
 
-/// Leaves --max-memory out where the command has it already.
-void addReaderOptions(CLI::App& command, ReaderArguments& a) {
-    const std::string group = "How to read the mesh";
-    command
-        .add_option(
-            "--reader", a.kind,
-            "isolated: in a process of its own, so that a damaged file can't crash or exhaust this one. "
-            "in-process: for debugging")
-        ->check(CLI::IsMember({"isolated", "in-process"}))
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option(
-            "--max-read-time", a.maxSeconds,
-            "seconds that reading may take (default: 3 of processor time and 60 until the end, and more "
-            "for large files); not with --reader in-process")
-        ->group(group);
-    if (!command.get_option_no_throw("--max-memory"))
-        command
-            .add_option(
-                "--max-memory", a.maxMemory,
-                "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size); not "
-                "with --reader in-process")
-            ->group(group);
-}
-
 }  // namespace
-
-void addCommonOptions(CLI::App& command, CommonOptions& options) {
-    command
-        .add_option("--threads", options.threads,
-                    "worker threads (default: one for every processor); the result never depends on it")
-        ->check(CLI::Range(0, 1024));
-    command.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
-    command.add_option("--json", options.jsonPath,
-                       "write a report as JSON to this file, or to standard output for -");
-    addReaderOptions(command, options.reader);
-}
-
-void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
-    const std::string group = "How to sample";
-    command
-        .add_option("--algorithm", a.name,
-                    "the resampler, or auto: the fastest that this machine has (results may then differ from "
-                    "machine to machine)")
-        ->capture_default_str()
-        ->group(group);
-    addBindOptions(command, a);
-}
-
-void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
-    const std::string group = "How to sample";
-    command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
-        ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}))
-        ->group(group);
-    command
-        .add_option(
-            "--sample-format", a.sampleFormat,
-            "what an OpenGL resampler keeps values in; r16 and r8 divide the field's range into steps")
-        ->check(CLI::IsMember({"r32f", "r16f", "r16", "r8"}))
-        ->capture_default_str()
-        ->group(group);
-    command
-        .add_option("--classification", a.classification,
-                    "how an OpenGL resampler decides what an element covers: by arithmetic, which meets the "
-                    "contract, or as the method was published, to see what that costs")
-        ->check(CLI::IsMember({"arithmetic", "published"}))
-        ->capture_default_str()
-        ->group(group);
-}
 
 void refuseReaderBounds(const ReaderArguments& a, const std::string& why) {
     require(!a.maxSeconds, "--max-read-time bounds the reading of a mesh: " + why);
     require(a.maxMemory.empty(), "--max-memory bounds the reading of a mesh here: " + why);
-}
-
-CLI::Validator numbersWithin(double first, double last) {
-    const auto check = [first, last](std::string& text) {
-        double value = 0;
-        const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool isNumber = failure == std::errc{} && end == text.data() + text.size();
-        return isNumber && value >= first && value <= last
-                   ? std::string()
-                   : fmt::format("expected {:g} to {:g}, got '{}'", first, last, text);
-    };
-    return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
 }
 
 BindOptions bindOptions(const AlgorithmArguments& a) {
@@ -304,24 +125,6 @@ BindOptions bindOptions(const AlgorithmArguments& a) {
 
 std::string lossyFormat(const BindOptions& options) {
     return options.format == SampleFormat::r32f ? std::string() : std::string(nameOf(options.format));
-}
-
-void addResampleOptions(CLI::App& command, ResampleArguments& a) {
-    command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")
-        ->required();
-    command.add_option("-o,--output", a.output,
-                       "the .vdb file; #### stands for the step's number in a series");
-    addRefineOptions(command, a);
-    addOutputOptions(command, a);
-    addAlgorithmOptions(command, a.algorithm);
-    addRepairOptions(command, a.repair);
-    addCommonOptions(command, a.common);
-    command.footer(R"(Examples:
-  tessera resample flow.vtu -o flow.vdb
-  tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
-  tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
-  tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
-  tessera resample 'run_*.vtu' -o 'out_####.vdb' --json report.json)");
 }
 
 ResampleSettings checkedSettings(const ResampleArguments& a) {

@@ -10,12 +10,6 @@
 #include "brick/refine.h"
 #include "io/vdb_file.h"
 
-// CLI11's own header costs every source that includes it several seconds.
-namespace CLI {
-class App;
-class Validator;
-}  // namespace CLI
-
 namespace tessera {
 
 /// How mesh files are read, as typed.
@@ -82,18 +76,9 @@ struct ResampleSettings {
     std::vector<std::string> errorFields;  ///< empty: all chosen point fields
 };
 
-void addCommonOptions(CLI::App& command, CommonOptions& options);
-void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& arguments);
-/// The same without --algorithm, for commands that run several.
-void addBindOptions(CLI::App& command, AlgorithmArguments& arguments);
-void addResampleOptions(CLI::App& command, ResampleArguments& arguments);
-
 /// For commands that were given no mesh to read: throws InputError when there are bounds on reading one.
 /// @param why "out.vdb is no mesh".
 void refuseReaderBounds(const ReaderArguments& arguments, const std::string& why);
-
-/// Numbers from `first` to `last`; says so in plain figures.
-CLI::Validator numbersWithin(double first, double last);
 
 BindOptions bindOptions(const AlgorithmArguments& arguments);
 /// The format's name when it isn't r32f, which loses nothing; else empty.

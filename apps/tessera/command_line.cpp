@@ -1,0 +1,477 @@
+#include "command_line.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <limits>
+#include <sstream>
+
+#include "base/error.h"
+#include "resample/cut_plane.h"
+
+namespace tessera {
+
+namespace {
+
+/// Numbers from `first` to `last`; says so in plain figures.
+CLI::Validator numbersWithin(double first, double last) {
+    const auto check = [first, last](std::string& text) {
+        double value = 0;
+        const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool isNumber = failure == std::errc{} && end == text.data() + text.size();
+        return isNumber && value >= first && value <= last
+                   ? std::string()
+                   : fmt::format("expected {:g} to {:g}, got '{}'", first, last, text);
+    };
+    return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
+}
+
+CLI::Option* addTimeStep(CLI::App& command, int& step) {
+    return command
+        .add_option("--time-step", step,
+                    "files with several steps: which one, counted from 0 (default: the last)")
+        ->check(CLI::Range(0, std::numeric_limits<int>::max()));
+}
+
+void addRepairOptions(CLI::App& command, RepairArguments& a) {
+    const std::string group = "Repair of the mesh";
+    auto* repair =
+        command
+            .add_flag("--repair", a.repair,
+                      "collapse degenerate elements (needles, spindles, slivers, caps, flat ones) into their "
+                      "neighbours and turn inverted ones; without it the mesh is taken as it is")
+            ->group(group);
+    command
+        .add_option("--repair-aspect", a.aspect,
+                    "elements are degenerate whose smallest height over their longest edge is below this "
+                    "(default: 1e-6)")
+        ->check(numbersWithin(1e-12, 0.5))
+        ->needs(repair)
+        ->group(group);
+    command
+        .add_option("--repair-angle", a.angle,
+                    "dihedral angles above this, in degrees, are large: their number tells the classes apart "
+                    "(default: 150)")
+        ->check(numbersWithin(90, 179))
+        ->needs(repair)
+        ->group(group);
+    command
+        .add_option("--repair-max-volume-loss", a.maxVolumeLoss,
+                    "share of the volume, such as 1e-4 or 0.01%, that removing elements may change "
+                    "(default: 1e-6); elements that need more stay, and a warning counts them")
+        ->needs(repair)
+        ->group(group);
+}
+
+/// Leaves --max-memory out where the command has it already.
+void addReaderOptions(CLI::App& command, ReaderArguments& a) {
+    const std::string group = "How to read the mesh";
+    command
+        .add_option(
+            "--reader", a.kind,
+            "isolated: in a process of its own, so that a damaged file can't crash or exhaust this one. "
+            "in-process: for debugging")
+        ->check(CLI::IsMember({"isolated", "in-process"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option(
+            "--max-read-time", a.maxSeconds,
+            "seconds that reading may take (default: 3 of processor time and 60 until the end, and more "
+            "for large files); not with --reader in-process")
+        ->group(group);
+    if (!command.get_option_no_throw("--max-memory"))
+        command
+            .add_option(
+                "--max-memory", a.maxMemory,
+                "memory that reading may take, e.g. 4G (default: 640M and 96 times the file's size); not "
+                "with --reader in-process")
+            ->group(group);
+}
+
+void addCommonOptions(CLI::App& command, CommonOptions& options) {
+    command
+        .add_option("--threads", options.threads,
+                    "worker threads (default: one for every processor); the result never depends on it")
+        ->check(CLI::Range(0, 1024));
+    command.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
+    command.add_option("--json", options.jsonPath,
+                       "write a report as JSON to this file, or to standard output for -");
+    addReaderOptions(command, options.reader);
+}
+
+/// How to sample, without --algorithm: for commands that run several.
+void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
+    const std::string group = "How to sample";
+    command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
+        ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}))
+        ->group(group);
+    command
+        .add_option(
+            "--sample-format", a.sampleFormat,
+            "what an OpenGL resampler keeps values in; r16 and r8 divide the field's range into steps")
+        ->check(CLI::IsMember({"r32f", "r16f", "r16", "r8"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--classification", a.classification,
+                    "how an OpenGL resampler decides what an element covers: by arithmetic, which meets the "
+                    "contract, or as the method was published, to see what that costs")
+        ->check(CLI::IsMember({"arithmetic", "published"}))
+        ->capture_default_str()
+        ->group(group);
+}
+
+void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
+    const std::string group = "How to sample";
+    command
+        .add_option("--algorithm", a.name,
+                    "the resampler, or auto: the fastest that this machine has (results may then differ from "
+                    "machine to machine)")
+        ->capture_default_str()
+        ->group(group);
+    addBindOptions(command, a);
+}
+
+void addRefineOptions(CLI::App& command, ResampleArguments& a) {
+    const std::string group = "Where to sample how finely";
+    a.common.reader.memoryBoundsRun = true;
+    command
+        .add_option(
+            "--refine", a.refine,
+            "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
+            "the measured error is within --max-error")
+        ->check(CLI::IsMember({"uniform", "element-size", "error"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--resolution", a.resolution,
+                    "lattice points along the longest axis, at the finest level")
+        ->group(group);
+    command.add_option("--spacing", a.spacing, "spacing of the finest level, in world units")->group(group);
+    command
+        .add_option("--samples-per-element", a.samplesPerElement,
+                    "element-size: samples along a typical element edge")
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--max-levels", a.maxLevels,
+                    "levels of spacing at most, each twice the one below (default: 8; for error no bound)")
+        ->group(group);
+    command
+        .add_option("--max-error", a.maxError,
+                    "error: bound in field units, or a share of each field's range such as 1%")
+        ->group(group);
+    command.add_option("--error-measure", a.errorMeasure, "error: which figure the bound holds for")
+        ->check(CLI::IsMember({"max", "rms"}))
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--error-field", a.errorFields,
+                    "error: fields a,b that the bound holds for (default: all point fields chosen)")
+        ->group(group);
+    command.add_option("--brick-size", a.brickSize, "cells along a brick's edge: 8, 16, 32 or 64")
+        ->capture_default_str()
+        ->group(group);
+    command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")
+        ->group(group);
+    command.add_option("--like", a.like, "use the lattice (origin and finest spacing) of this .vdb file")
+        ->group(group);
+    command
+        .add_option("--max-voxels", a.maxVoxels,
+                    "bound on stored voxels, e.g. 500M (default: from the memory there is)")
+        ->group(group);
+    command
+        .add_option(
+            "--max-memory", a.common.reader.maxMemory,
+            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G; with "
+            "--reader in-process reading itself has no bound")
+        ->group(group);
+    command
+        .add_flag("--dry-run", a.dryRun,
+                  "print voxels, bytes and predicted time of each layout; write nothing")
+        ->group(group);
+}
+
+void addOutputOptions(CLI::App& command, ResampleArguments& a) {
+    const std::string group = "What to write";
+    command.add_option("--field", a.fields, "fields to sample: a,b=newname,... (default: all)")->group(group);
+    command
+        .add_option("--layout", a.layout,
+                    "levels: one grid a field and level. flat: one grid a field at the finest spacing")
+        ->check(CLI::IsMember({"levels", "flat"}))
+        ->capture_default_str()
+        ->group(group);
+    command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
+    command
+        .add_option("--extend", a.extendLayers,
+                    "layers of voxels written outside the mesh, with the value at the nearest mesh point "
+                    "(default: 1 for "
+                    "the flat layout, which Blender and Houdini interpolate without looking at the mesh; 0 "
+                    "for levels)")
+        ->group(group);
+    command.add_option("--background", a.background, "value of voxels that are not stored")
+        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option("--unit-scale", a.unitScale,
+                    "file units per world unit (default: 1, or a power of ten when voxels are tiny)")
+        ->group(group);
+    command
+        .add_option("--up-axis", a.upAxis,
+                    "turn the grid so that this axis of the file points up: keep, y or z")
+        ->check(CLI::IsMember({"keep", "y", "z"}))
+        ->capture_default_str()
+        ->group(group);
+    addTimeStep(command, a.timeStep)->group(group);
+}
+
+void addResampleOptions(CLI::App& command, ResampleArguments& a) {
+    command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")
+        ->required();
+    command.add_option("-o,--output", a.output,
+                       "the .vdb file; #### stands for the step's number in a series");
+    addRefineOptions(command, a);
+    addOutputOptions(command, a);
+    addAlgorithmOptions(command, a.algorithm);
+    addRepairOptions(command, a.repair);
+    addCommonOptions(command, a.common);
+    command.footer(R"(Examples:
+  tessera resample flow.vtu -o flow.vdb
+  tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
+  tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
+  tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
+  tessera resample 'run_*.vtu' -o 'out_####.vdb' --json report.json)");
+}
+
+void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
+    command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote");
+    command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
+    addTimeStep(command, arguments.timeStep);
+    addRepairOptions(command, arguments.repair);
+    addCommonOptions(command, arguments.common);
+    command.footer(
+        "Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -\n  tessera info --gl");
+}
+
+void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
+    command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")
+        ->required();
+    command.add_option("vdb", arguments.vdbPath, "the .vdb file (layout levels)")->required();
+    addTimeStep(command, arguments.timeStep);
+    command.add_option("--samples", arguments.samples, "stored voxels to evaluate one by one")
+        ->check(CLI::Range(0, 1000000000))
+        ->capture_default_str();
+    addCommonOptions(command, arguments.common);
+    command.footer(
+        "Measures the error anew and compares it with what the file says. Exit code 2 when a claim does not "
+        "hold.\n"
+        "Example:\n  tessera verify mesh.vtu out.vdb");
+}
+
+void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
+    command.add_option("mesh", arguments.input, "mesh file")->required();
+    command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra")->required();
+    addTimeStep(command, arguments.timeStep);
+    addRepairOptions(command, arguments.repair);
+    addCommonOptions(command, arguments.common);
+    command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
+}
+
+void addPictureOptions(CLI::App& command, PictureArguments& a) {
+    command.add_option("vdb", a.input, "a .vdb file that tessera wrote (layout levels)")->required();
+    command.add_option("-o,--output", a.output, "the .png file")->required();
+    command.add_option("--field", a.field, "the field (default: the first)");
+    command
+        .add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")
+        ->check(CLI::Range(0, 8));
+    command.add_option("--axis", a.axis, "the slice is normal to this axis")
+        ->check(CLI::IsMember({"x", "y", "z"}))
+        ->capture_default_str();
+    command.add_option("--at", a.at, "where along that axis, world units (default: the middle)");
+    command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
+    command.add_option("--range", a.range,
+                       "values a,b at the ends of the colour map (default: those of the slice)");
+    command.add_option("--mesh", a.mesh,
+                       "the mesh file: draws up to the mesh's surface instead of whole voxels");
+    command.add_option("--pixels", a.pixels, "along the longer edge")
+        ->check(CLI::Range(16, 8192))
+        ->capture_default_str();
+    command.add_flag("--bricks", a.bricks, "draw the edges of the bricks");
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
+        "  tessera picture flow.vdb -o near.png --field velocity --bounds -1,-1,-1,1,1,1 --bricks --mesh "
+        "flow.vtu");
+}
+
+void addSliceOptions(CLI::App& command, SliceArguments& a) {
+    const std::string where = "Where to cut", what = "What to write";
+    command.add_option("mesh", a.input, "a mesh file")->required();
+    command
+        .add_option("-o,--output", a.output,
+                    "a .exr file (32-bit floats: a channel for every component of every field, and "
+                    "coverage) or a .png file (one field in colours, with a legend)")
+        ->required();
+    command
+        .add_option("--origin", a.origin,
+                    "a point x,y,z of the plane (default: the middle of the mesh's box)")
+        ->group(where);
+    command.add_option("--normal", a.normal, "the plane's normal a,b,c, of any length")
+        ->capture_default_str()
+        ->group(where);
+    command
+        .add_option(
+            "--up", a.up,
+            "what points up in the picture: its projection onto the plane (default: y for a normal "
+            "nearest to the z axis, else z; so axes right and up are x,y for z, x,z for y, y,z for x)")
+        ->group(where);
+    command
+        .add_option(
+            "--size", a.size,
+            "width and height w,h, or one length s for both, around the origin, in world units (default: as "
+            "large as the cut)")
+        ->group(where);
+    command.add_option("--resolution", a.resolution, "pixels along the longer edge")
+        ->check(CLI::Range(1, kLargestCutResolution))
+        ->capture_default_str()
+        ->group(where);
+    addTimeStep(command, a.timeStep)->group(where);
+    command
+        .add_option("--field", a.fields,
+                    "fields to sample: a,b=newname,... (default: all for .exr, the first for .png)")
+        ->group(what);
+    command
+        .add_option("--component", a.component,
+                    ".png: component of a vector, counted from 0 (default: its length)")
+        ->check(CLI::Range(0, 8))
+        ->group(what);
+    command
+        .add_option("--range", a.range,
+                    ".png: values a,b at the ends of the colour map (default: those of the cut)")
+        ->group(what);
+    addAlgorithmOptions(command, a.algorithm);
+    addRepairOptions(command, a.repair);
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Pixels outside the mesh hold 0 and coverage 0; a value that isn't finite is NaN.\n"
+        "Examples:\n  tessera slice flow.vtu -o cut.exr --origin 0,0,0.5 --normal 1,1,0\n"
+        "  tessera slice flow.vtu -o cut.png --normal 0,1,0 --field pressure --range 0,2\n"
+        "  tessera slice flow.vtu -o near.exr --origin 1,2,0 --normal 0,0,1 --size 0.5 --resolution 4096");
+}
+
+void addCompareOptions(CLI::App& command, CompareArguments& a) {
+    command.add_option("mesh", a.meshes, "mesh files")->required();
+    command.add_option(
+        "--algorithms", a.algorithms,
+        "names with commas between them, each with a target if wanted: software,slicing:osmesa; "
+        "the first is what the others are compared with (default: all that can run here)");
+    addBindOptions(command, a.algorithm);
+    auto* resolution =
+        command
+            .add_option("--resolution", a.resolution, "lattice points along the longest axis (default: 128)")
+            ->check(CLI::Range(2, 1 << 20));
+    command.add_option("--spacing", a.spacing, "spacing of the lattice, in world units")
+        ->check(CLI::PositiveNumber)
+        ->excludes(resolution);
+    command.add_option("--field", a.fields, "fields to sample: a,b (default: all)");
+    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    command
+        .add_option("--box", a.boxEdge,
+                    "points along the edge of the boxes sampled at once; smaller ones are taken when many "
+                    "channels need it")
+        ->check(CLI::Range(16, 512))
+        ->capture_default_str();
+    command.add_flag("--markdown", a.markdown, "print one table in Markdown, one row a mesh and algorithm");
+    addTimeStep(command, a.timeStep);
+    addRepairOptions(command, a.repair);
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Samples the mesh by each algorithm on one lattice and compares coverage, values and times; checks "
+        "every "
+        "sample against the mesh. Exit\ncode 1 when coverage differs away from the mesh boundary or a sample "
+        "is "
+        "wrong.\n"
+        "Examples:\n  tessera compare mesh.vtu\n"
+        "  tessera compare mesh.vtu --algorithms software,slicing,hybrid --resolution 256 --field pressure\n"
+        "  tessera compare mesh.vtu --algorithms software,slicing --sample-format r8 --json report.json\n"
+        "  tessera compare *.vtu --markdown");
+}
+
+void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
+    command.add_option("mesh", a.mesh, "mesh file; the paper's is the bluntfin")->required();
+    addBindOptions(command, a.algorithm);
+    command.add_option("--field", a.field,
+                       "the field to sample (default: the first scalar field of the points)");
+    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    command
+        .add_option("--max-size", a.maxSize,
+                    "leave out grids with more points than this along an axis (there are 128 to 1024)")
+        ->check(CLI::Range(128, 1024))
+        ->capture_default_str();
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Times the algorithms on the mesh, its double (mirrored at a plane perpendicular to y) and its "
+        "quadruple (y "
+        "and z), on the grids of Weiler and\nErtl 2001, and prints their figures 9 to 11 beside.\n"
+        "Examples:\n  tessera paper-tables bluntfin.vtu\n"
+        "  tessera paper-tables bluntfin.vtu --classification published --max-size 256 --json tables.json");
+}
+
+void describe(CLI::App& app, CommandLine& arguments) {
+    app.name("tessera");
+    app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
+    app.set_help_flag("-h,--help", "print this help and exit");
+    app.require_subcommand(1);
+    app.get_formatter()->column_width(34);
+    app.footer(
+        "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
+        "codes: 0 done, "
+        "2 bad input or usage, 1 any other failure, 130 interrupted.");
+    addResampleOptions(
+        *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
+        arguments.resample);
+    addInfoOptions(
+        *app.add_subcommand("info", "what a mesh file or a .vdb file holds, or what OpenGL there is"),
+        arguments.info);
+    addVerifyOptions(*app.add_subcommand("verify", "check a .vdb file's error report against its mesh"),
+                     arguments.verify);
+    addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"),
+                   arguments.tets);
+    addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
+                      arguments.picture);
+    addCompareOptions(
+        *app.add_subcommand("compare", "several algorithms on one lattice: coverage, values, times"),
+        arguments.compare);
+    addPaperTablesOptions(
+        *app.add_subcommand("paper-tables", "the algorithms' times beside those of the paper they come from"),
+        arguments.paperTables);
+    addSliceOptions(*app.add_subcommand("slice", "cut a mesh with any plane: a float EXR or a .png"),
+                    arguments.slice);
+}
+
+}  // namespace
+
+CommandLine parseCommandLine(int argc, char** argv) {
+    CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
+    CommandLine line;
+    describe(app, line);
+    try {
+        app.parse(argc, argv);
+        line.command = app.get_subcommands().front()->get_name();
+    } catch (const CLI::ParseError& error) {
+        if (error.get_exit_code() != 0)
+            throw InputError(fmt::format("{} (tessera --help tells more)", error.what()));
+        std::ostringstream text;
+        app.exit(error, text);
+        line.text = text.str();
+    }
+    return line;
+}
+
+}  // namespace tessera
