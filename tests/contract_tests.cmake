@@ -15,7 +15,7 @@ endif()
 set_tests_properties(${contract_tests} PROPERTIES TIMEOUT 900)
 
 # The OpenGL resamplers run as tests of their own beside the others of the same programs: they take longer, and
-# thread sanitizers have no place for their drivers. An emulated device takes many minutes for all points and cases, so it is a twentieth of them;
+# thread sanitizers have no place for their drivers. An emulated device takes many minutes for all points and cases, so it is a fiftieth of them;
 # run the program itself for the whole.
 function(tessera_split_device_tests)
   set(others "")
@@ -26,7 +26,7 @@ function(tessera_split_device_tests)
       foreach(program IN LISTS ARGN)
         if(NOT TESSERA_SANITIZE MATCHES thread)
           add_test(NAME ${program}.${algorithm} COMMAND ${program} --gtest_filter=*${name}*)
-          set_tests_properties(${program}.${algorithm} PROPERTIES TIMEOUT 1800 ENVIRONMENT TESSERA_CONTRACT_SCALE=0.05)
+          set_tests_properties(${program}.${algorithm} PROPERTIES TIMEOUT 1800 ENVIRONMENT TESSERA_CONTRACT_SCALE=0.02)
         endif()
       endforeach()
     endif()
