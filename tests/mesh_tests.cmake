@@ -10,7 +10,10 @@ if(TESSERA_BUILD_IO)
   tessera_test(repair_data_test LINK io)
   tessera_program(misbehaving_reader SOURCES misbehaving_reader.cpp LINK io)
   tessera_test(isolated_reader_test LINK io)
-  target_compile_definitions(isolated_reader_test PRIVATE TESSERA_MISBEHAVING_READER="$<TARGET_FILE:misbehaving_reader>"
-    TESSERA_QUICK_READER="$<TARGET_FILE:tessera_read_mesh>")
-  add_dependencies(isolated_reader_test misbehaving_reader tessera_read_mesh)
+  tessera_test(solver_formats_test LINK io PRIVATE_LINK VTK::exodusII VTK::cgns fmt::fmt)
+  foreach(name isolated_reader_test solver_formats_test)
+    target_compile_definitions(${name} PRIVATE TESSERA_MISBEHAVING_READER="$<TARGET_FILE:misbehaving_reader>"
+      TESSERA_QUICK_READER="$<TARGET_FILE:tessera_read_mesh>")
+    add_dependencies(${name} misbehaving_reader tessera_read_mesh)
+  endforeach()
 endif()

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <unordered_map>
 #include <utility>
 
 #include "base/error.h"
@@ -71,6 +72,11 @@ std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& blo
     std::vector<Vec3d> points(kept.size());
     for (std::size_t i = 0; i < kept.size(); ++i) points[i] = block.points[std::size_t(kept[i])];
     block.points = std::move(points);
+    if (!block.nodeIds.empty()) {
+        std::vector<std::int64_t> ids(kept.size());
+        for (std::size_t i = 0; i < kept.size(); ++i) ids[i] = block.nodeIds[std::size_t(kept[i])];
+        block.nodeIds = std::move(ids);
+    }
     return kept;
 }
 
@@ -86,6 +92,26 @@ void gatherTuples(Field& field, const std::vector<Index>& items, const Execution
                     values[i * components + c] = field.values[std::size_t(items[i]) * components + c];
         });
     field.values = std::move(values);
+}
+
+/// The merged index of every point of every block: points with one number are one, where all have numbers.
+/// Gives the number of merged points.
+std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>& blocks,
+                                                     std::size_t& count) {
+    const bool numbered = std::all_of(blocks.begin(), blocks.end(), [](const RawBlock& block) {
+        return block.nodeIds.size() == block.points.size();
+    });
+    std::vector<std::vector<std::int32_t>> indices;
+    std::unordered_map<std::int64_t, std::int32_t> indexOf;
+    count = 0;
+    for (const RawBlock& block : blocks) {
+        std::vector<std::int32_t>& index = indices.emplace_back(block.points.size());
+        for (std::size_t i = 0; i < index.size(); ++i) {
+            const bool isNew = !numbered || indexOf.emplace(block.nodeIds[i], std::int32_t(count)).second;
+            index[i] = isNew ? std::int32_t(count++) : indexOf.at(block.nodeIds[i]);
+        }
+    }
+    return indices;
 }
 
 /// One block with points, cells and fields of all; cell fields have one tuple for every listed cell.
@@ -113,10 +139,14 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
     RawBlock all;
     std::map<std::pair<FieldLocation, std::string>, std::size_t> fieldOf;
     std::set<std::pair<FieldLocation, std::string>> partial;
-    std::size_t pointBase = 0, cellBase = 0;
-    for (RawBlock& block : raw.blocks) {
-        forEachNode(block.cells, execution, [&](std::int32_t& node) { node += std::int32_t(pointBase); });
-        all.points.insert(all.points.end(), block.points.begin(), block.points.end());
+    std::size_t mergedPoints = 0, cellBase = 0;
+    std::vector<std::vector<std::int32_t>> indices = mergedIndices(raw.blocks, mergedPoints);
+    all.points.resize(mergedPoints);
+    for (std::size_t b = 0; b < raw.blocks.size(); ++b) {
+        RawBlock& block = raw.blocks[b];
+        const std::vector<std::int32_t> index = std::move(indices[b]);
+        forEachNode(block.cells, execution, [&](std::int32_t& node) { node = index[std::size_t(node)]; });
+        for (std::size_t i = 0; i < index.size(); ++i) all.points[std::size_t(index[i])] = block.points[i];
         all.cells.kinds.insert(all.cells.kinds.end(), block.cells.kinds.begin(), block.cells.kinds.end());
         const auto nodeBase = std::int64_t(all.cells.nodes.size());
         for (std::size_t c = 1; c < block.cells.begin.size(); ++c)
@@ -131,20 +161,24 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
             if (place == fieldOf.end()) {
                 place = fieldOf.emplace(key, all.fields.size()).first;
                 all.fields.push_back({field.name, field.location, field.components, {}});
-                all.fields.back().values.assign((atPoints ? points : cells) * std::size_t(field.components),
-                                                kNan);
-                if ((atPoints ? pointBase : cellBase) > 0) partial.insert(key);
+                all.fields.back().values.assign(
+                    (atPoints ? mergedPoints : cells) * std::size_t(field.components), kNan);
+                if (cellBase > 0) partial.insert(key);
             }
             Field& target = all.fields[place->second];
             if (target.components != field.components) continue;
             seen.insert(place->second);
-            const std::size_t base = (atPoints ? pointBase : cellBase) * std::size_t(field.components);
-            std::copy(field.values.begin(), field.values.end(), target.values.begin() + std::ptrdiff_t(base));
+            const auto components = std::size_t(field.components);
+            const std::size_t items = field.values.size() / components;
+            for (std::size_t i = 0; i < items; ++i) {
+                const std::size_t item = atPoints ? std::size_t(index[i]) : cellBase + i;
+                std::copy_n(field.values.begin() + std::ptrdiff_t(i * components), components,
+                            target.values.begin() + std::ptrdiff_t(item * components));
+            }
         }
         if (!block.cells.kinds.empty())
-            for (const auto& [key, index] : fieldOf)
-                if (!seen.contains(index)) partial.insert(key);
-        pointBase += block.points.size();
+            for (const auto& [key, field] : fieldOf)
+                if (!seen.contains(field)) partial.insert(key);
         cellBase += block.cells.kinds.size();
         block = {};
     }

@@ -20,6 +20,8 @@ struct ArrayInfo {
 /// One block of a file before splitting.
 struct RawBlock {
     std::vector<Vec3d> points;
+    std::vector<std::int64_t>
+        nodeIds;     ///< the file's number of every point, where blocks share points; else empty
     CellList cells;  ///< 3D cells that take part; node indices and face streams are checked
     std::vector<std::int64_t>
         sourceCell;  ///< position of each of these cells in the block; empty when it is the same
@@ -41,8 +43,8 @@ std::string cellFieldName(const std::string& name);
 /// Whether the options ask for an array of this name and place.
 bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location);
 
-/// Merges the blocks, drops nodes that no cell uses, splits the cells, carries the fields over and fills the
-/// statistics. Throws InputError.
+/// Merges the blocks, and their points that have one number, drops nodes that no cell uses, splits the cells,
+/// carries the fields over and fills the statistics. Throws InputError.
 MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options,
                       const Execution& execution);
 

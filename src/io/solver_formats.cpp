@@ -23,10 +23,11 @@ VtkSource openExodus(const std::string& path) {
     reader->GenerateObjectIdCellArrayOff();
     reader->GenerateGlobalElementIdArrayOff();
     reader->GenerateGlobalNodeIdArrayOff();
+    reader->GenerateImplicitNodeIdArrayOn();  // element blocks share nodes
     reader->UpdateInformation();
     reader->SetAllArrayStatus(vtkExodusIIReader::NODAL, 1);
     reader->SetAllArrayStatus(vtkExodusIIReader::ELEM_BLOCK, 1);
-    return {reader, "Exodus II"};
+    return {reader, "Exodus II", vtkExodusIIReader::GetImplicitNodeIdArrayName()};
 }
 
 VtkSource openCgns(const std::string& path) {

@@ -197,6 +197,19 @@ void copyFields(const std::string& path, vtkDataSetAttributes* attributes, Field
     }
 }
 
+/// Takes the array out of the attributes, so that it is no field.
+void takeNodeIds(vtkDataSetAttributes* attributes, const std::string& name, RawBlock& block) {
+    if (name.empty()) return;
+    vtkDataArray* ids = attributes->GetArray(name.c_str());
+    if (!ids || ids->GetNumberOfComponents() != 1 ||
+        ids->GetNumberOfTuples() != vtkIdType(block.points.size()))
+        return;
+    block.nodeIds.resize(block.points.size());
+    for (std::size_t i = 0; i < block.nodeIds.size(); ++i)
+        block.nodeIds[i] = std::int64_t(ids->GetComponent(vtkIdType(i), 0));
+    attributes->RemoveArray(name.c_str());
+}
+
 struct ChunkCounts {
     std::int64_t cells = 0, nodes = 0, skipped = 0, blanked = 0, higherOrder = 0;
     std::int64_t bad = -1;  // first cell that is damaged
@@ -446,8 +459,8 @@ void readStructured(const std::string& path, Grid* grid, RawBlock& block, Import
         block, statistics);
 }
 
-void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions& options,
-                   const Execution& execution, RawMesh& raw) {
+void appendDataSet(const std::string& path, vtkDataSet* data, const std::string& nodeIds,
+                   const ReadOptions& options, const Execution& execution, RawMesh& raw) {
     RawBlock block;
     block.sourceCells = data->GetNumberOfCells();
     if (auto* unstructured = vtkUnstructuredGrid::SafeDownCast(data))
@@ -462,6 +475,7 @@ void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions&
         raw.statistics.skippedCells += data->GetNumberOfCells();
     if (block.cells.kinds.empty()) return;
     copyPoints(path, data, execution, block.points);
+    takeNodeIds(data->GetPointData(), nodeIds, block);
     copyFields(path, data->GetPointData(), FieldLocation::point, data->GetNumberOfPoints(), options,
                execution, block);
     copyFields(path, data->GetCellData(), FieldLocation::cell, data->GetNumberOfCells(), options, execution,
@@ -471,10 +485,10 @@ void appendDataSet(const std::string& path, vtkDataSet* data, const ReadOptions&
 
 }  // namespace
 
-void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptions& options,
-                   const Execution& execution, RawMesh& raw) {
+void appendVtkData(const std::string& path, vtkDataObject* data, const std::string& nodeIds,
+                   const ReadOptions& options, const Execution& execution, RawMesh& raw) {
     if (auto* set = vtkDataSet::SafeDownCast(data)) {
-        appendDataSet(path, set, options, execution, raw);
+        appendDataSet(path, set, nodeIds, options, execution, raw);
         return;
     }
     auto* composite = vtkCompositeDataSet::SafeDownCast(data);
@@ -483,7 +497,7 @@ void appendVtkData(const std::string& path, vtkDataObject* data, const ReadOptio
     for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
         execution.throwIfCancelled();
         if (auto* set = vtkDataSet::SafeDownCast(iterator->GetCurrentDataObject()))
-            appendDataSet(path, set, options, execution, raw);
+            appendDataSet(path, set, nodeIds, options, execution, raw);
     }
 }
 

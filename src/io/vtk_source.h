@@ -13,6 +13,7 @@ namespace tessera {
 struct VtkSource {
     vtkSmartPointer<vtkAlgorithm> reader;
     std::string format;
+    std::string nodeIds{};  ///< the array with the file's number of every point, where blocks share points
 };
 
 }  // namespace tessera

@@ -93,6 +93,8 @@ class Splitter {
                 fanPolygon();
             }
         }
+        if (kind == CellKind::wedge && volumeInside(centreOfNodes()) < 0)
+            for (Triangle& triangle : triangles_) std::swap(triangle[1], triangle[2]);
         coneTriangles(kind == CellKind::polyhedron);
     }
 
