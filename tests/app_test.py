@@ -1006,6 +1006,7 @@ class Help(AppTest):
         for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"]):
             text = self.succeed(*command, "--help")
             self.assertIn("Example", text)
+        self.reject(2, "no command 'resmaple'", "resmaple", "mesh.vtu")
         self.assertRegex(self.succeed("--version"), r"^tessera \d+\.\d+\.\d+\n$")
 
 

@@ -461,6 +461,9 @@ CommandLine parseCommandLine(int argc, char** argv) {
     CLI::App app("Resamples simulation meshes into adaptive bricks of voxels.");
     CommandLine line;
     describe(app, line);
+    const auto isFirstWord = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
+    if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(isFirstWord).empty())
+        throw InputError(fmt::format("there is no command '{}' (tessera --help lists them)", argv[1]));
     try {
         app.parse(argc, argv);
         line.command = app.get_subcommands().front()->get_name();
