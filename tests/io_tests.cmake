@@ -7,7 +7,7 @@ if(TESSERA_BUILD_IO)
   endforeach()
   tessera_test(vdb_metadata_test LINK io)
   # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
-  foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh)
+  foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)
     tessera_program(replay_${name} SOURCES fuzz/replay.cpp fuzz/${name}.cpp LINK io)
     add_test(NAME replay_${name} COMMAND replay_${name} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${name})
   endforeach()

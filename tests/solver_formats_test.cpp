@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "io/isolated_reader.h"
 #include "io/read_mesh.h"
 #include "mesh_test_tools.h"
@@ -172,6 +173,46 @@ TEST(SolverFormats, Exodus) {
     }
 }
 
+bool holds(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+/// The message that reading is refused with.
+std::string refusal(const std::string& path) {
+    try {
+        readMesh(path, {}, {});
+    } catch (const InputError& error) {
+        return error.what();
+    }
+    ADD_FAILURE() << path << " was read";
+    return {};
+}
+
+TEST(SolverFormats, ExodusRefusesWhatIsCutOff) {
+    const TemporaryFolder folder;
+    const std::string path = writeExodus(folder, "box.ex2");
+    const auto size = std::filesystem::file_size(path);
+    std::filesystem::resize_file(path, size - 8);  // the last value of the last step
+    EXPECT_PRED2(holds, refusal(path), "cut off: its variables take " + std::to_string(size));
+    std::filesystem::resize_file(path, 100);
+    EXPECT_PRED2(holds, refusal(path), "box.ex2: damaged");
+}
+
+TEST(SolverFormats, ExodusRefusesNodesThatAreNotThere) {
+    const TemporaryFolder folder;
+    for (const std::int64_t node : {0, 13, 1 << 30}) {
+        const std::string path = writeExodus(folder, "box.ex2");
+        int computeWord = 8, fileWord = 8;
+        float version = 0;
+        const int file = ex_open(path.c_str(), EX_WRITE, &computeWord, &fileWord, &version);
+        std::array<int, 12> wedges{2, 3, 5, 8, 9, 11, 3, 6, 5, 9, 12, int(node)};
+        EXPECT_EQ(ex_put_conn(file, EX_ELEM_BLOCK, 9, wedges.data(), nullptr, nullptr), 0);
+        EXPECT_EQ(ex_close(file), 0);
+        EXPECT_PRED2(holds, refusal(path),
+                     "element 2 (counted from 1) of block 9 names node " + std::to_string(node));
+    }
+}
+
 // CGNS
 
 void check(int cgnsStatus) {
@@ -204,14 +245,22 @@ void writeCgnsCells(int file, int base, int zone, const std::vector<double>& val
                          &written));
 }
 
-TEST(SolverFormats, CgnsUnstructured) {
-    const TemporaryFolder folder;
-    for (const int kind : {CG_FILE_ADF, CG_FILE_HDF5}) {
-        const std::string path = folder.file(kind == CG_FILE_ADF ? "adf.cgns" : "hdf5.cgns");
-        int file = 0, base = 0, zone = 0, section = 0;
+struct CgnsFile {
+    CgnsFile(const std::string& where, int kind) : path(where) {
         check(cg_set_file_type(kind));
         check(cg_open(path.c_str(), CG_MODE_WRITE, &file));
         check(cg_base_write(file, "Base", 3, 3, &base));
+    }
+    std::string path;
+    int file = 0, base = 0;
+};
+
+TEST(SolverFormats, CgnsUnstructured) {
+    const TemporaryFolder folder;
+    for (const int kind : {CG_FILE_ADF, CG_FILE_HDF5}) {
+        CgnsFile out(folder.file(kind == CG_FILE_ADF ? "adf.cgns" : "hdf5.cgns"), kind);
+        const auto& [path, file, base] = out;
+        int zone = 0, section = 0;
         const std::array<cgsize_t, 3> size{kNodes, 3, 0};
         check(cg_zone_write(file, base, "Zone", size.data(), CGNS_ENUMV(Unstructured), &zone));
         std::vector<cgsize_t> hexahedron, wedges;
@@ -238,11 +287,9 @@ TEST(SolverFormats, CgnsUnstructured) {
 
 TEST(SolverFormats, CgnsStructured) {
     const TemporaryFolder folder;
-    const std::string path = folder.file("box.cgns");
-    int file = 0, base = 0, zone = 0;
-    check(cg_set_file_type(CG_FILE_HDF5));
-    check(cg_open(path.c_str(), CG_MODE_WRITE, &file));
-    check(cg_base_write(file, "Base", 3, 3, &base));
+    CgnsFile out(folder.file("box.cgns"), CG_FILE_HDF5);
+    const auto& [path, file, base] = out;
+    int zone = 0;
     const std::array<cgsize_t, 9> size{3, 2, 2, 2, 1, 1, 0, 0, 0};
     check(cg_zone_write(file, base, "Zone", size.data(), CGNS_ENUMV(Structured), &zone));
     writeCgnsNodes(file, base, zone);
@@ -257,6 +304,62 @@ TEST(SolverFormats, CgnsStructured) {
     const Field& material = field(mesh, "Material", FieldLocation::cell);
     for (std::int64_t e = 0; e < mesh.mesh.elementCount(); ++e)
         EXPECT_EQ(material.at(e, 0), cellValue(mesh.mesh, e) == 10 ? 10 : 20);
+}
+
+TEST(SolverFormats, CgnsFieldsOfTheSecondZoneOnly) {
+    const TemporaryFolder folder;
+    CgnsFile out(folder.file("zones.cgns"), CG_FILE_HDF5);
+    const auto& [path, file, base] = out;
+    for (const char* name : {"A", "B"}) {
+        const std::array<cgsize_t, 9> size{3, 2, 2, 2, 1, 1, 0, 0, 0};
+        int zone = 0, written = 0;
+        check(cg_zone_write(file, base, name, size.data(), CGNS_ENUMV(Structured), &zone));
+        writeCgnsNodes(file, base, zone);
+        if (*name == 'A') continue;
+        writeCgnsCells(file, base, zone, {10, 20});
+        for (const char* field : {"Pressure", "ForceX", "ForceY", "ForceZ"})
+            check(cg_field_write(file, base, zone, 1, CGNS_ENUMV(RealDouble), field,
+                                 nodeValues([](const Vec3d& p) { return p.x; }).data(), &written));
+    }
+    check(cg_close(file));
+
+    const MeshFile mesh = read(path);
+    EXPECT_EQ(mesh.statistics.cells, 4);
+    EXPECT_EQ(mesh.statistics.warnings.size(), 3u);  // absent in A
+    for (const auto& [name, place] : {std::pair("Pressure", FieldLocation::point),
+                                      {"Force", FieldLocation::point},
+                                      {"Material", FieldLocation::cell}}) {
+        const ValueRange range = fieldRange(field(mesh, name, place), 0);
+        EXPECT_EQ(range.max, place == FieldLocation::point ? 2 : 20) << name;
+    }
+    EXPECT_EQ(field(mesh, "Force", FieldLocation::point).components, 3);
+}
+
+TEST(SolverFormats, CgnsPolyhedraAreUpright) {
+    const TemporaryFolder folder;
+    CgnsFile out(folder.file("polyhedron.cgns"), CG_FILE_HDF5);
+    const auto& [path, file, base] = out;
+    int zone = 0, section = 0;
+    const std::array<cgsize_t, 3> size{kNodes, 1, 0};
+    check(cg_zone_write(file, base, "Zone", size.data(), CGNS_ENUMV(Unstructured), &zone));
+    writeCgnsNodes(file, base, zone);
+    const std::array<cgsize_t, 24> nodes{1, 4,  5,  2, 7, 8, 11, 10, 1, 2, 8,  7,
+                                         4, 10, 11, 5, 1, 7, 10, 4,  2, 5, 11, 8};
+    const std::array<cgsize_t, 7> ends{0, 4, 8, 12, 16, 20, 24};
+    check(cg_poly_section_write(file, base, zone, "Faces", CGNS_ENUMV(NGON_n), 1, 6, 0, nodes.data(),
+                                ends.data(), &section));
+    const std::array<cgsize_t, 6> faces{1, 2, 3, 4, 5, 6};
+    const std::array<cgsize_t, 2> cellEnds{0, 6};
+    check(cg_poly_section_write(file, base, zone, "Cells", CGNS_ENUMV(NFACE_n), 7, 7, 0, faces.data(),
+                                cellEnds.data(), &section));
+    check(cg_close(file));
+
+    const MeshFile mesh = read(path);
+    EXPECT_EQ(mesh.statistics.cells, 1);
+    EXPECT_EQ(mesh.statistics.nodes, 8);
+    EXPECT_EQ(mesh.statistics.inverted, 0);
+    EXPECT_DOUBLE_EQ(sumOfVolumes(mesh.mesh), 1);
+    expectScalar(mesh, "Temperature", 0);
 }
 
 // EnSight Gold in text, two steps of the variables.
@@ -330,10 +433,8 @@ std::string foamList(const std::vector<std::string>& entries) {
     return text + ")\n";
 }
 
-TEST(SolverFormats, OpenFoam) {
-    const TemporaryFolder folder;
-    for (const char* name : {"constant/polyMesh", "system", "0.5", "1"})
-        std::filesystem::create_directories(folder.file(name));
+/// @param region empty, or the region's name and a slash.
+void writeFoamMesh(const TemporaryFolder& folder, const std::string& region) {
     std::vector<std::string> points, faces, owners;
     for (int i = 0; i < kNodes; ++i) {
         const Vec3d p = node(i);
@@ -348,18 +449,24 @@ TEST(SolverFormats, OpenFoam) {
         faces.push_back(face);
         owners.push_back(std::to_string(owner));
     }
-    const std::string mesh = "constant/polyMesh/";
+    const std::string mesh = "constant/" + region + "polyMesh/";
+    std::filesystem::create_directories(folder.file(mesh));
     folder.write(mesh + "points", foamHead("vectorField", "points") + foamList(points));
     folder.write(mesh + "faces", foamHead("faceList", "faces") + foamList(faces));
     folder.write(mesh + "owner", foamHead("labelList", "owner") + foamList(owners));
     folder.write(mesh + "neighbour", foamHead("labelList", "neighbour") + foamList({"1", "2"}));
     folder.write(mesh + "boundary", foamHead("polyBoundaryMesh", "boundary") +
                                         "1\n(\nwalls\n{\ntype wall;\nnFaces 12;\nstartFace 2;\n}\n)\n");
+}
+
+void writeFoamFields(const TemporaryFolder& folder, const std::string& region) {
+    std::filesystem::create_directories(folder.file("system"));
     folder.write("system/controlDict", foamHead("dictionary", "controlDict") +
                                            "startFrom startTime;\nstartTime 0;\nstopAt endTime;\nendTime 1;\n"
                                            "deltaT 0.5;\nwriteControl timeStep;\nwriteInterval 1;\n");
     for (int step = 0; step < 2; ++step) {
-        const std::string time = step == 0 ? "0.5/" : "1/";
+        const std::string time = (step == 0 ? "0.5/" : "1/") + region;
+        std::filesystem::create_directories(folder.file(time));
         std::vector<std::string> cells, nodes;
         for (const double value : kCellValues) cells.push_back(fmt::format("{}", (step + 1) * value));
         for (int i = 0; i < kNodes; ++i) nodes.push_back(fmt::format("{}", scalarAt(node(i), step)));
@@ -373,6 +480,12 @@ TEST(SolverFormats, OpenFoam) {
                                      "dimensions [0 1 -1 0 0 0 0];\ninternalField uniform (1 2 3);\n"
                                      "boundaryField { walls { type zeroGradient; } }\n");
     }
+}
+
+TEST(SolverFormats, OpenFoam) {
+    const TemporaryFolder folder;
+    writeFoamMesh(folder, "");
+    writeFoamFields(folder, "");
     const std::string path = folder.write("box.foam", "");
     for (const int step : {-1, 0, 1}) {
         const MeshFile file = read(path, step);
@@ -387,6 +500,34 @@ TEST(SolverFormats, OpenFoam) {
             for (int axis = 0; axis < 3; ++axis) EXPECT_EQ(velocity.at(e, axis), axis + 1);
         EXPECT_EQ(file.mesh.fields.size(), 3u);
     }
+}
+
+TEST(SolverFormats, OpenFoamRegions) {
+    const TemporaryFolder folder;
+    for (const char* region : {"fluid/", "solid/"}) {
+        writeFoamMesh(folder, region);
+        writeFoamFields(folder, region);
+    }
+    const MeshFile file = read(folder.write("box.foam", ""));
+    EXPECT_EQ(file.statistics.blocks, 2);
+    EXPECT_EQ(file.statistics.cells, 6);
+    EXPECT_DOUBLE_EQ(sumOfVolumes(file.mesh), 4);
+    expectCellValues(file, "p", 2);
+    expectScalar(file, "T", 1);
+}
+
+TEST(SolverFormats, OpenFoamInParts) {
+    const TemporaryFolder folder;
+    std::filesystem::create_directories(folder.file("processor0/2.5"));
+    const std::string path = folder.write("box.foam", "");
+    EXPECT_PRED2(holds, refusal(path), "reconstructPar");
+    writeFoamMesh(folder, "");
+    writeFoamFields(folder, "");
+    const MeshFile whole = readMesh(path, {}, {});
+    ASSERT_EQ(whole.statistics.warnings.size(), 1u);
+    EXPECT_PRED2(holds, whole.statistics.warnings[0], "times up to 2.5");
+    std::filesystem::remove(folder.file("processor0/2.5"));
+    EXPECT_TRUE(readMesh(path, {}, {}).statistics.warnings.empty());
 }
 
 }  // namespace

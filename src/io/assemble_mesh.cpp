@@ -4,7 +4,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <unordered_map>
 #include <utility>
 
 #include "base/error.h"
@@ -94,21 +93,36 @@ void gatherTuples(Field& field, const std::vector<Index>& items, const Execution
     field.values = std::move(values);
 }
 
-/// The merged index of every point of every block: points with one number are one, where all have numbers.
+/// The merged index of every point of every block: points with one number are one, where all have numbers
+/// and these are dense.
 /// Gives the number of merged points.
 std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>& blocks,
                                                      std::size_t& count) {
-    const bool numbered = std::all_of(blocks.begin(), blocks.end(), [](const RawBlock& block) {
-        return block.nodeIds.size() == block.points.size();
-    });
+    constexpr std::int64_t kMostNumbersAPoint = 64;  // a table of more isn't worth the memory
+    bool numbered = true;
+    std::int64_t largest = 0, points = 0;
+    for (const RawBlock& block : blocks) {
+        numbered = numbered && block.nodeIds.size() == block.points.size();
+        for (const std::int64_t id : block.nodeIds) {
+            numbered = numbered && id >= 0;
+            largest = std::max(largest, id);
+        }
+        points += std::int64_t(block.points.size());
+    }
+    numbered = numbered && largest < kMostNumbersAPoint * points;
     std::vector<std::vector<std::int32_t>> indices;
-    std::unordered_map<std::int64_t, std::int32_t> indexOf;
+    std::vector<std::int32_t> indexOf(numbered ? std::size_t(largest) + 1 : 0, -1);
     count = 0;
     for (const RawBlock& block : blocks) {
         std::vector<std::int32_t>& index = indices.emplace_back(block.points.size());
         for (std::size_t i = 0; i < index.size(); ++i) {
-            const bool isNew = !numbered || indexOf.emplace(block.nodeIds[i], std::int32_t(count)).second;
-            index[i] = isNew ? std::int32_t(count++) : indexOf.at(block.nodeIds[i]);
+            if (!numbered) {
+                index[i] = std::int32_t(count++);
+                continue;
+            }
+            std::int32_t& merged = indexOf[std::size_t(block.nodeIds[i])];
+            if (merged < 0) merged = std::int32_t(count++);
+            index[i] = merged;
         }
     }
     return indices;

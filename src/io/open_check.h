@@ -1,12 +1,20 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace tessera {
 
 /// Opens and closes a file with the library beneath VTK's reader: that reader prints, or even ends the
-/// process, when it can't. Throws InputError.
+/// process, when it can't. Checks the elements' nodes, which VTK's reader takes as they are. Throws
+/// InputError.
 void checkExodusFile(const std::string& path);
-void checkCgnsFile(const std::string& path);
+
+/// The fields of all zones of a file, a component of a vector each; VTK's reader lists those of the first.
+struct CgnsFields {
+    std::vector<std::string> atPoints, atCells;
+};
+/// Opens and closes as checkExodusFile does.
+CgnsFields checkCgnsFile(const std::string& path);
 
 }  // namespace tessera

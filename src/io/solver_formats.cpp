@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "io/ensight_check.h"
+#include "io/foam_check.h"
 #include "io/open_check.h"
 #include "io/vtk_source.h"
 
@@ -31,7 +32,7 @@ VtkSource openExodus(const std::string& path) {
 }
 
 VtkSource openCgns(const std::string& path) {
-    checkCgnsFile(path);
+    const CgnsFields fields = checkCgnsFile(path);
     auto reader = vtkSmartPointer<vtkCGNSReader>::New();
     reader->SetFileName(path.c_str());
     reader->SetDoublePrecisionMesh(1);
@@ -41,6 +42,16 @@ VtkSource openCgns(const std::string& path) {
     reader->EnableAllFamilies();
     reader->EnableAllPointArrays();
     reader->EnableAllCellArrays();
+    // The reader may know a component, or its vector.
+    const auto forBoth = [](const std::string& name, const auto& enable) {
+        enable(name);
+        if (name.ends_with('X') || name.ends_with('Y') || name.ends_with('Z'))
+            enable(name.substr(0, name.size() - 1));
+    };
+    for (const std::string& name : fields.atPoints)
+        forBoth(name, [&](const std::string& n) { reader->SetPointArrayStatus(n.c_str(), 1); });
+    for (const std::string& name : fields.atCells)
+        forBoth(name, [&](const std::string& n) { reader->SetCellArrayStatus(n.c_str(), 1); });
     return {reader, "CGNS"};
 }
 
@@ -53,6 +64,7 @@ VtkSource openEnSight(const std::string& path) {
 }
 
 VtkSource openFoam(const std::string& path) {
+    const std::string oddity = checkFoamCase(path);
     auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
     reader->SetFileName(path.c_str());
     reader->DecomposePolyhedraOff();
@@ -63,7 +75,13 @@ VtkSource openFoam(const std::string& path) {
     reader->DisableAllLagrangianArrays();
     reader->DisableAllPatchArrays();
     reader->SetPatchArrayStatus("internalMesh", 1);
-    return {reader, "OpenFOAM"};
+    for (int i = 0; i < reader->GetNumberOfPatchArrays(); ++i) {  // of regions: "/fluid/internalMesh"
+        const std::string name = reader->GetPatchArrayName(i);
+        if (name.ends_with("/internalMesh")) reader->SetPatchArrayStatus(name.c_str(), 1);
+    }
+    VtkSource source{reader, "OpenFOAM"};
+    source.warning = oddity;
+    return source;
 }
 
 }  // namespace

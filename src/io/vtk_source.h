@@ -14,6 +14,7 @@ struct VtkSource {
     vtkSmartPointer<vtkAlgorithm> reader;
     std::string format;
     std::string nodeIds{};  ///< the array with the file's number of every point, where blocks share points
+    std::string warning{};  ///< what is odd about the file: a sentence, or empty
 };
 
 }  // namespace tessera

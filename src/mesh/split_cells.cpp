@@ -93,7 +93,9 @@ class Splitter {
                 fanPolygon();
             }
         }
-        if (kind == CellKind::wedge && volumeInside(centreOfNodes()) < 0)
+        if (triangles_.empty()) return;
+        const bool eitherWay = kind == CellKind::wedge || kind == CellKind::polyhedron;
+        if (eitherWay && volumeInside(centreOfNodes()) < 0)
             for (Triangle& triangle : triangles_) std::swap(triangle[1], triangle[2]);
         coneTriangles(kind == CellKind::polyhedron);
     }
@@ -247,7 +249,6 @@ void Splitter::fanPolygon() {
 /// from which every tet has the sign of the cell and none grazes a face; the centre; a node from which some
 /// tets are slivers, then flat; for a polyhedron the centre whatever it does; the smallest node as it is.
 void Splitter::coneTriangles(bool isPolyhedron) {
-    if (triangles_.empty()) return;
     const auto smaller = [&](std::int32_t a, std::int32_t b) { return before(a, b); };
     const auto grazes = [&](std::int32_t node) {
         return std::find(grazing_.begin(), grazing_.end(), node) != grazing_.end();

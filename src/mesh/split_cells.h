@@ -48,8 +48,9 @@ struct SplitCells {
 /// coordinates (ties: of its index), unless its worst triangle is much better fanned from another (warped and
 /// concave faces, hanging nodes). A cell is the cone from its own smallest node over the triangles that don't
 /// hold it; where that inverts or flattens a tet, from another node or from its centre, which adds a node.
-/// Tets keep the orientation of their cell; a wedge is upright either way, as both orders of its nodes are in
-/// use (VTK's documentation has one, its shape functions and the libraries of CGNS and Exodus the other).
+/// Tets keep the orientation of their cell. A wedge is upright either way, as both orders of its nodes are in
+/// use (VTK's documentation has one, its shape functions and the libraries of CGNS and Exodus the other), and
+/// so is a polyhedron, whose faces some readers turn inwards.
 /// Tets with a repeated node are left out; other flat ones are kept.
 /// @param cells every node index lies in [0, points.size()); every polyhedron's face stream is whole.
 SplitCells splitCells(const std::vector<Vec3d>& points, const CellList& cells, const Execution& execution);

@@ -20,6 +20,9 @@ constexpr std::array<double, 32> kCoordinates{
     1e200, 1e300, 1e-300, 5e-324, 2.3e-308, kLargest, -kLargest,   kLargest / 2,
     -0.0,  1e15,  1e16,   0.25,   0.75,     4,        1 + 0x1p-52, 1 - 0x1p-53};
 
+constexpr std::array<std::int64_t, 16> kNodeIds{0, 1, 2,  3,  4,  5,   6,  7,
+                                                8, 9, 10, 11, 12, 100, -1, std::int64_t(1) << 40};
+
 /// Takes bytes from the front; zeros when there are none left.
 class Bytes {
   public:
@@ -79,6 +82,8 @@ RawBlock makeBlock(Bytes& bytes) {
         block.arrays.push_back({field->name, field->location, field->components, true});
         block.fields.push_back(std::move(*field));
     }
+    if (bytes.next(4) == 1)
+        for (int p = 0; p < points; ++p) block.nodeIds.push_back(kNodeIds[std::size_t(bytes.next(16))]);
     return block;
 }
 
