@@ -362,6 +362,23 @@ TEST(SolverFormats, CgnsPolyhedraAreUpright) {
     expectScalar(mesh, "Temperature", 0);
 }
 
+TEST(SolverFormats, CgnsSeveralSolutionsAreAWarning) {
+    const TemporaryFolder folder;
+    CgnsFile out(folder.file("solutions.cgns"), CG_FILE_HDF5);
+    const auto& [path, file, base] = out;
+    const std::array<cgsize_t, 9> size{3, 2, 2, 2, 1, 1, 0, 0, 0};
+    int zone = 0, solution = 0, written = 0;
+    check(cg_zone_write(file, base, "Blade", size.data(), CGNS_ENUMV(Structured), &zone));
+    writeCgnsNodes(file, base, zone);
+    check(cg_sol_write(file, base, zone, "More", CGNS_ENUMV(Vertex), &solution));
+    check(cg_field_write(file, base, zone, solution, CGNS_ENUMV(RealDouble), "Pressure",
+                         nodeValues([](const Vec3d& p) { return p.x; }).data(), &written));
+    check(cg_close(file));
+    const MeshFile mesh = read(path);
+    ASSERT_EQ(mesh.statistics.warnings.size(), 1u);
+    EXPECT_PRED2(holds, mesh.statistics.warnings[0], "Zone 'Blade' has several solutions");
+}
+
 // EnSight Gold in text, two steps of the variables.
 
 std::string lines(const std::vector<double>& values) {
@@ -377,8 +394,7 @@ std::string indexLine(const Indices& indices) {
     return text + "\n";
 }
 
-TEST(SolverFormats, EnSightGold) {
-    const TemporaryFolder folder;
+std::string writeEnSight(const TemporaryFolder& folder) {
     const std::string part = "part\n         1\n";
     std::string geometry = "a box\nof three cells\nnode id assign\nelement id assign\n" + part +
                            "fluid\ncoordinates\n        12\n";
@@ -401,13 +417,18 @@ TEST(SolverFormats, EnSightGold) {
                                                    lines({factor * kCellValues[0]}) + "penta6\n" +
                                                    lines({factor * kCellValues[1], factor * kCellValues[2]}));
     }
-    const std::string path = folder.write("box.case",
-                                          "FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: box.geo\n\n"
-                                          "VARIABLE\nscalar per node: 1 temp box.****.temp\n"
-                                          "vector per node: vel box.vel\n"
-                                          "scalar per element: 1 material box.****.mat\n\n"
-                                          "TIME\ntime set: 1\nnumber of steps: 2\nfilename start number: 0\n"
-                                          "filename increment: 1\ntime values: 0.0 0.5\n");
+    return folder.write("box.case",
+                        "FORMAT\ntype: ensight gold\n\nGEOMETRY\nmodel: box.geo\n\n"
+                        "VARIABLE\nscalar per node: 1 temp box.****.temp\n"
+                        "vector per node: vel box.vel\n"
+                        "scalar per element: 1 material box.****.mat\n\n"
+                        "TIME\ntime set: 1\nnumber of steps: 2\nfilename start number: 0\n"
+                        "filename increment: 1\ntime values: 0.0 0.5\n");
+}
+
+TEST(SolverFormats, EnSightGold) {
+    const TemporaryFolder folder;
+    const std::string path = writeEnSight(folder);
     for (const int step : {-1, 0, 1}) {
         const MeshFile file = read(path, step);
         EXPECT_EQ(file.statistics.format, "EnSight");
@@ -417,6 +438,19 @@ TEST(SolverFormats, EnSightGold) {
         expectVector(file, "vel");
         expectCellValues(file, "material", shown + 1);
         EXPECT_EQ(file.mesh.fields.size(), 3u);
+    }
+}
+
+TEST(SolverFormats, EnSightFilesThatLookCutOff) {
+    const TemporaryFolder folder;
+    const std::string path = writeEnSight(folder);
+    EXPECT_TRUE(readMesh(path, {}, {}).statistics.warnings.empty());
+    for (const char* name : {"box.geo", "box.vel"}) {
+        writeEnSight(folder);
+        std::filesystem::resize_file(folder.file(name), std::filesystem::file_size(folder.file(name)) - 3);
+        const std::vector<std::string> warnings = readMesh(path, {}, {}).statistics.warnings;
+        ASSERT_EQ(warnings.size(), 1u);
+        EXPECT_PRED2(holds, warnings[0], std::string(name) + " looks cut off");
     }
 }
 

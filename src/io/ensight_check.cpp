@@ -49,11 +49,36 @@ std::int64_t checkedSize(const std::string& casePath, const std::filesystem::pat
     return error ? 0 : std::int64_t(bytes);
 }
 
+bool isBinary(InputFile& file) {
+    const std::string head = file.copy(0, 84);  // a line of 80, after the length that Fortran gives a record
+    return head.find("C Binary") != std::string::npos || head.find("Fortran Binary") != std::string::npos;
+}
+
+/// Text ends with a line break, and all that binary files hold takes a multiple of 4 bytes.
+std::vector<std::string> findCutOff(const std::vector<std::filesystem::path>& paths) {
+    std::vector<std::string> cutOff;
+    bool binary = false;  // the head of the geometry says so, those of the variables don't
+    for (const std::filesystem::path& path : paths) {
+        InputFile file(path.string());
+        binary = binary || isBinary(file);
+    }
+    for (const std::filesystem::path& path : paths) {
+        InputFile file(path.string());
+        const bool whole = binary ? file.size() % 4 == 0 : file.copy(file.size() - 1, 1) == "\n";
+        if (!whole)
+            cutOff.push_back(path.filename().string() + " looks cut off: it ends within a " +
+                             (binary ? "number." : "line."));
+    }
+    return cutOff;
+}
+
 }  // namespace
 
-std::int64_t checkEnSightCase(const std::string& path) {
+EnSightCase checkEnSightCase(const std::string& path) {
     InputFile file(path);
-    auto bytes = std::int64_t(file.size());
+    EnSightCase found;
+    found.bytes = std::int64_t(file.size());
+    std::vector<std::filesystem::path> data;
     const std::string text = file.copy(0, kLongestCase);
     int files = 0;
     for (std::string_view rest = text; !rest.empty() && files < kMostFiles;) {
@@ -62,11 +87,14 @@ std::int64_t checkEnSightCase(const std::string& path) {
         const std::string name = lastWord(line);
         if (name.empty()) continue;
         for (const std::filesystem::path& named : filesNamed(path, name)) {
-            bytes += checkedSize(path, named);
+            const std::int64_t bytes = checkedSize(path, named);
+            found.bytes += bytes;
+            if (bytes > 0) data.push_back(named);
             if (++files == kMostFiles) break;
         }
     }
-    return bytes;
+    found.warnings = findCutOff(data);
+    return found;
 }
 
 }  // namespace tessera

@@ -2,11 +2,18 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace tessera {
 
-/// Bytes of an EnSight case and of the files that it names. Throws InputError when one of them is a pipe or a
-/// device, at which VTK's reader would wait for ever.
-std::int64_t checkEnSightCase(const std::string& path);
+/// An EnSight case with the files that it names.
+struct EnSightCase {
+    std::int64_t bytes = 0;
+    /// A sentence for every file that ends as none does that was written to its end: VTK's reader makes up
+    /// values there.
+    std::vector<std::string> warnings;
+};
+/// Throws InputError when one of the files is a pipe or a device, at which VTK's reader would wait for ever.
+EnSightCase checkEnSightCase(const std::string& path);
 
 }  // namespace tessera

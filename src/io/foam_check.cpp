@@ -48,7 +48,7 @@ bool hasMesh(const fs::path& folder) {
 
 }  // namespace
 
-std::string checkFoamCase(const std::string& path) {
+std::vector<std::string> checkFoamCase(const std::string& path) {
     fs::path folder = fs::path(path).parent_path();
     if (folder.empty()) folder = ".";
     std::pair<double, std::string> ofParts;
@@ -65,9 +65,9 @@ std::string checkFoamCase(const std::string& path) {
                          "); join them first, with reconstructPar");
     const auto ofCase = latestTime(folder);
     if (ofParts.second.empty() || (!ofCase.second.empty() && ofParts.first <= ofCase.first)) return {};
-    return "The parts that a parallel run left have times up to " + ofParts.second +
-           ", the whole case, which is read, up to " + (ofCase.second.empty() ? "none" : ofCase.second) +
-           "; reconstructPar joins them.";
+    return {"The parts that a parallel run left have times up to " + ofParts.second +
+            ", the whole case, which is read, up to " + (ofCase.second.empty() ? "none" : ofCase.second) +
+            "; reconstructPar joins them."};
 }
 
 }  // namespace tessera

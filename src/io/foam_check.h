@@ -1,12 +1,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace tessera {
 
-/// A sentence when the parts that a parallel run left hold later times than the whole OpenFOAM case, which is
-/// what is read; else empty. Throws InputError when the case has parts only.
+/// Warns when the parts that a parallel run left hold later times than the whole OpenFOAM case, which is what
+/// is read. Throws InputError when the case has parts only.
 /// @param path the .foam file in the case's folder.
-std::string checkFoamCase(const std::string& path);
+std::vector<std::string> checkFoamCase(const std::string& path);
 
 }  // namespace tessera

@@ -57,12 +57,15 @@ void checkElementNodes(const std::string& path, int file, const ex_init_params& 
 void listFields(int file, int base, int zone, CgnsFields& fields) {
     int solutions = 0;
     if (cg_nsols(file, base, zone, &solutions) != 0) return;
+    std::array<char, 64> name{};
+    int pointSolutions = 0, cellSolutions = 0;
     for (int s = 1; s <= solutions; ++s) {
-        std::array<char, 64> name{};
         CGNS_ENUMT(GridLocation_t) location{};
         int count = 0;
         if (cg_sol_info(file, base, zone, s, name.data(), &location) != 0) continue;
         if (cg_nfields(file, base, zone, s, &count) != 0) continue;
+        pointSolutions += location == CGNS_ENUMV(Vertex);
+        cellSolutions += location == CGNS_ENUMV(CellCenter);
         for (int f = 1; f <= count; ++f) {
             CGNS_ENUMT(DataType_t) type{};
             if (cg_field_info(file, base, zone, s, f, &type, name.data()) != 0) continue;
@@ -70,6 +73,13 @@ void listFields(int file, int base, int zone, CgnsFields& fields) {
             if (location == CGNS_ENUMV(CellCenter)) fields.atCells.emplace_back(name.data());
         }
     }
+    // Those of the steps of a series are told apart by data that a zone has for them.
+    const bool isSeries = cg_ziter_read(file, base, zone, name.data()) == 0;
+    if (isSeries || (pointSolutions < 2 && cellSolutions < 2)) return;
+    std::array<cgsize_t, 9> size{};
+    cg_zone_read(file, base, zone, name.data(), size.data());
+    fields.warnings.push_back("Zone '" + std::string(name.data()) +
+                              "' has several solutions at its points or in its cells; one at each is read.");
 }
 
 /// None where the library above cgio, which is stricter, can't open the file.

@@ -13,6 +13,7 @@ void checkExodusFile(const std::string& path);
 /// The fields of all zones of a file, a component of a vector each; VTK's reader lists those of the first.
 struct CgnsFields {
     std::vector<std::string> atPoints, atCells;
+    std::vector<std::string> warnings;  ///< a sentence for every zone of which VTK's reader leaves fields out
 };
 /// Opens and closes as checkExodusFile does.
 CgnsFields checkCgnsFile(const std::string& path);

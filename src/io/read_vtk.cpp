@@ -149,7 +149,7 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     if (!data) throw InputError(path + ": could not be read as " + opened.format);
     if (format == VtkFormat::xml) checkCounts(path, info, data);
     raw.statistics.format = opened.format;
-    if (!opened.warning.empty()) raw.statistics.warnings.push_back(opened.warning);
+    raw.statistics.warnings = opened.warnings;
     appendVtkData(path, data, opened.nodeIds, options, execution, raw);
     throwOnErrors(path, messages);
     for (const std::string& warning : messages.warnings())

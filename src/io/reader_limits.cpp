@@ -63,7 +63,7 @@ InputSize sizeOfInput(const std::string& path) {
         const std::int64_t cells = size.fileBytes > kSmallFile ? size.cellsOfAll : 0;
         return {double(size.fileBytes), double(std::max(cells, size.gridPoints))};
     }
-    if (extension == ".case" || extension == ".encas") return {double(checkEnSightCase(path)), 0};
+    if (extension == ".case" || extension == ".encas") return {double(checkEnSightCase(path).bytes), 0};
     if (extension == ".node" || extension == ".ele")
         return {double(sizeOf(std::filesystem::path(given).replace_extension(".node")) +
                        sizeOf(std::filesystem::path(given).replace_extension(".ele"))),

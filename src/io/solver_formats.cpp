@@ -5,6 +5,8 @@
 #include <vtkGenericEnSightReader.h>
 #include <vtkOpenFOAMReader.h>
 
+#include <utility>
+
 #include "base/error.h"
 #include "io/ensight_check.h"
 #include "io/foam_check.h"
@@ -52,19 +54,19 @@ VtkSource openCgns(const std::string& path) {
         forBoth(name, [&](const std::string& n) { reader->SetPointArrayStatus(n.c_str(), 1); });
     for (const std::string& name : fields.atCells)
         forBoth(name, [&](const std::string& n) { reader->SetCellArrayStatus(n.c_str(), 1); });
-    return {reader, "CGNS"};
+    return {reader, "CGNS", {}, fields.warnings};
 }
 
 VtkSource openEnSight(const std::string& path) {
-    checkEnSightCase(path);
+    EnSightCase files = checkEnSightCase(path);
     auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
     reader->SetCaseFileName(path.c_str());
     reader->ReadAllVariablesOn();
-    return {reader, "EnSight"};
+    return {reader, "EnSight", {}, std::move(files.warnings)};
 }
 
 VtkSource openFoam(const std::string& path) {
-    const std::string oddity = checkFoamCase(path);
+    std::vector<std::string> warnings = checkFoamCase(path);
     auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
     reader->SetFileName(path.c_str());
     reader->DecomposePolyhedraOff();
@@ -79,9 +81,7 @@ VtkSource openFoam(const std::string& path) {
         const std::string name = reader->GetPatchArrayName(i);
         if (name.ends_with("/internalMesh")) reader->SetPatchArrayStatus(name.c_str(), 1);
     }
-    VtkSource source{reader, "OpenFOAM"};
-    source.warning = oddity;
-    return source;
+    return {reader, "OpenFOAM", {}, std::move(warnings)};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <vtkSmartPointer.h>
 
 #include <string>
+#include <vector>
 
 #include "io/read_vtk.h"
 
@@ -14,7 +15,7 @@ struct VtkSource {
     vtkSmartPointer<vtkAlgorithm> reader;
     std::string format;
     std::string nodeIds{};  ///< the array with the file's number of every point, where blocks share points
-    std::string warning{};  ///< what is odd about the file: a sentence, or empty
+    std::vector<std::string> warnings{};  ///< what is odd about the file, a sentence each
 };
 
 }  // namespace tessera
