@@ -209,7 +209,7 @@ TEST(SolverFormats, ExodusRefusesNodesThatAreNotThere) {
         EXPECT_EQ(ex_put_conn(file, EX_ELEM_BLOCK, 9, wedges.data(), nullptr, nullptr), 0);
         EXPECT_EQ(ex_close(file), 0);
         EXPECT_PRED2(holds, refusal(path),
-                     "element 2 (counted from 1) of block 9 names node " + std::to_string(node));
+                     "element 2 of block 2 (both counted from 1) names node " + std::to_string(node));
     }
 }
 
@@ -450,7 +450,7 @@ TEST(SolverFormats, EnSightFilesThatLookCutOff) {
         std::filesystem::resize_file(folder.file(name), std::filesystem::file_size(folder.file(name)) - 3);
         const std::vector<std::string> warnings = readMesh(path, {}, {}).statistics.warnings;
         ASSERT_EQ(warnings.size(), 1u);
-        EXPECT_PRED2(holds, warnings[0], std::string(name) + " looks cut off");
+        EXPECT_PRED2(holds, warnings[0], std::string(name) + " may be cut off");
     }
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -49,27 +51,20 @@ std::int64_t checkedSize(const std::string& casePath, const std::filesystem::pat
     return error ? 0 : std::int64_t(bytes);
 }
 
-bool isBinary(InputFile& file) {
-    const std::string head = file.copy(0, 84);  // a line of 80, after the length that Fortran gives a record
-    return head.find("C Binary") != std::string::npos || head.find("Fortran Binary") != std::string::npos;
-}
-
-/// Text ends with a line break, and all that binary files hold takes a multiple of 4 bytes.
-std::vector<std::string> findCutOff(const std::vector<std::filesystem::path>& paths) {
-    std::vector<std::string> cutOff;
-    bool binary = false;  // the head of the geometry says so, those of the variables don't
-    for (const std::filesystem::path& path : paths) {
-        InputFile file(path.string());
-        binary = binary || isBinary(file);
-    }
-    for (const std::filesystem::path& path : paths) {
-        InputFile file(path.string());
-        const bool whole = binary ? file.size() % 4 == 0 : file.copy(file.size() - 1, 1) == "\n";
-        if (!whole)
-            cutOff.push_back(path.filename().string() + " looks cut off: it ends within a " +
-                             (binary ? "number." : "line."));
-    }
-    return cutOff;
+/// The first bytes of a file and its last one; empty when it can't be read.
+struct Ends {
+    std::string head, tail;
+};
+Ends endsOf(const std::string& path) {
+    constexpr std::streamsize kHead = 84;  // a line of 80, after the length that Fortran gives a record
+    std::ifstream file(path, std::ios::binary);
+    Ends ends{std::string(std::size_t(kHead), '\0'), std::string(1, '\0')};
+    file.read(ends.head.data(), kHead);
+    ends.head.resize(std::size_t(file.gcount()));
+    file.clear();
+    file.seekg(-1, std::ios::end);
+    file.read(ends.tail.data(), 1);
+    return file ? ends : Ends{};
 }
 
 }  // namespace
@@ -78,7 +73,6 @@ EnSightCase checkEnSightCase(const std::string& path) {
     InputFile file(path);
     EnSightCase found;
     found.bytes = std::int64_t(file.size());
-    std::vector<std::filesystem::path> data;
     const std::string text = file.copy(0, kLongestCase);
     int files = 0;
     for (std::string_view rest = text; !rest.empty() && files < kMostFiles;) {
@@ -89,12 +83,33 @@ EnSightCase checkEnSightCase(const std::string& path) {
         for (const std::filesystem::path& named : filesNamed(path, name)) {
             const std::int64_t bytes = checkedSize(path, named);
             found.bytes += bytes;
-            if (bytes > 0) data.push_back(named);
+            if (bytes > 0) found.named.emplace(named.string(), bytes);
             if (++files == kMostFiles) break;
         }
     }
-    found.warnings = findCutOff(data);
     return found;
+}
+
+std::vector<std::string> findCutOffFiles(const EnSightCase& files) {
+    std::vector<Ends> ends;
+    bool binary = false;  // the head of the geometry says so, those of the variables don't
+    for (const auto& [path, bytes] : files.named) {
+        ends.push_back(endsOf(path));
+        const std::string& head = ends.back().head;
+        binary = binary || head.find("C Binary") != std::string::npos ||
+                 head.find("Fortran Binary") != std::string::npos;
+    }
+    std::vector<std::string> cutOff;
+    std::size_t i = 0;
+    for (const auto& [path, bytes] : files.named) {
+        const std::string& tail = ends[i++].tail;
+        if (!tail.empty() && (binary ? bytes % 4 != 0 : tail != "\n"))
+            cutOff.push_back(std::filesystem::path(path).filename().string());
+    }
+    if (cutOff.empty()) return {};
+    const std::string others = cutOff.size() > 1 ? " and " + std::to_string(cutOff.size() - 1) + " more" : "";
+    return {cutOff.front() + others + " may be cut off: " + (others.empty() ? "it ends" : "they end") +
+            " within a " + (binary ? "number." : "line.")};
 }
 
 }  // namespace tessera

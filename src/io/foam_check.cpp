@@ -1,7 +1,7 @@
 #include "io/foam_check.h"
 
-#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 #include <vector>
@@ -31,7 +31,7 @@ std::pair<double, std::string> latestTime(const fs::path& folder) {
         const std::string name = path.filename().string();
         double time = 0;
         const auto [end, failure] = std::from_chars(name.data(), name.data() + name.size(), time);
-        if (failure != std::errc{} || end != name.data() + name.size()) continue;
+        if (failure != std::errc{} || end != name.data() + name.size() || !std::isfinite(time)) continue;
         if (latest.second.empty() || time > latest.first) latest = {time, name};
     }
     return latest;
@@ -39,11 +39,19 @@ std::pair<double, std::string> latestTime(const fs::path& folder) {
 
 bool hasMesh(const fs::path& folder) {
     std::error_code ignored;
-    if (fs::is_directory(folder / "polyMesh", ignored)) return true;
-    const std::vector<fs::path> regions = foldersIn(folder);
-    return std::any_of(regions.begin(), regions.end(), [&](const fs::path& region) {
-        return fs::is_directory(region / "polyMesh", ignored);
-    });
+    return fs::exists(folder / "polyMesh/faces", ignored) ||
+           fs::exists(folder / "polyMesh/faces.gz", ignored);
+}
+
+/// Whether there is a mesh of the whole case: constant, or of a time, of all or of a region.
+bool hasWholeMesh(const fs::path& folder) {
+    for (const fs::path& candidate : foldersIn(folder)) {
+        if (candidate.filename().string().starts_with("processor")) continue;
+        if (hasMesh(candidate)) return true;
+        for (const fs::path& region : foldersIn(candidate))
+            if (hasMesh(region)) return true;
+    }
+    return false;
 }
 
 }  // namespace
@@ -56,11 +64,12 @@ std::vector<std::string> checkFoamCase(const std::string& path) {
     for (const fs::path& candidate : foldersIn(folder)) {
         if (!candidate.filename().string().starts_with("processor")) continue;
         const auto latest = latestTime(candidate);
-        if (part.empty() || latest.first > ofParts.first) ofParts = latest;
+        if (ofParts.second.empty() || (!latest.second.empty() && latest.first > ofParts.first))
+            ofParts = latest;
         part = candidate.filename().string();
     }
     if (part.empty()) return {};
-    if (!hasMesh(folder / "constant"))
+    if (!hasWholeMesh(folder))
         throw InputError(path + ": the case is decomposed: its mesh is in parts (" + part +
                          "); join them first, with reconstructPar");
     const auto ofCase = latestTime(folder);

@@ -19,38 +19,97 @@ namespace {
 
 constexpr std::int64_t kNodesAtOnce = 1 << 20;
 
-/// Throws InputError for an element of the block that names a node which isn't there. What can't be read, or
-/// is no list of nodes, is left to VTK.
-void checkElementNodes(const std::string& path, int file, std::int64_t id, std::int64_t nodes) {
-    ex_block block{};
-    block.id = id;
-    block.type = EX_ELEM_BLOCK;
-    if (ex_get_block_param(file, &block) < 0 || block.num_entry < 1 || block.num_nodes_per_entry < 1) return;
-    const std::string topology = block.topology;
-    if (topology.starts_with("nsided") || topology.starts_with("NSIDED") || topology.starts_with("nfaced") ||
-        topology.starts_with("NFACED"))
-        return;
-    const std::int64_t perElement = block.num_nodes_per_entry;
+/// A NetCDF file that is open. What isn't there has length -1.
+class NetcdfFile {
+  public:
+    explicit NetcdfFile(const std::string& path) : path_(path) {
+        if (const int error = nc_open(path.c_str(), NC_NOWRITE, &id_); error != NC_NOERR)
+            throw InputError(path + ": damaged: the NetCDF library can't open it: " + nc_strerror(error));
+    }
+    ~NetcdfFile() { nc_close(id_); }
+    NetcdfFile(const NetcdfFile&) = delete;
+    NetcdfFile& operator=(const NetcdfFile&) = delete;
+
+    int id() const { return id_; }
+    int variableCount() const {
+        int count = 0;
+        return nc_inq_nvars(id_, &count) == NC_NOERR ? count : 0;
+    }
+    std::string nameOf(int variable) const {
+        std::array<char, NC_MAX_NAME + 1> name{};
+        return nc_inq_varname(id_, variable, name.data()) == NC_NOERR ? name.data() : std::string();
+    }
+    std::int64_t length(const std::string& dimension) const {
+        int found = 0;
+        return nc_inq_dimid(id_, dimension.c_str(), &found) == NC_NOERR ? length(found) : -1;
+    }
+    std::vector<std::int64_t> lengths(int variable) const {
+        int count = 0;
+        if (nc_inq_varndims(id_, variable, &count) != NC_NOERR) return {};
+        std::vector<int> dimensions(std::size_t(count) + 1);
+        if (nc_inq_vardimid(id_, variable, dimensions.data()) != NC_NOERR) return {};
+        std::vector<std::int64_t> found;
+        for (int d = 0; d < count; ++d) found.push_back(length(dimensions[std::size_t(d)]));
+        return found;
+    }
+    [[noreturn]] void fail(const std::string& what) const { throw InputError(path_ + ": damaged: " + what); }
+
+  private:
+    std::int64_t length(int dimension) const {
+        std::size_t found = 0;
+        return nc_inq_dimlen(id_, dimension, &found) == NC_NOERR ? std::int64_t(found) : -1;
+    }
+
+    std::string path_;
+    int id_ = 0;
+};
+
+/// Throws InputError for a list of elements that the Exodus library, which trusts its shape, would read past
+/// its memory, or that names a node which isn't there.
+/// @param block the number behind "connect".
+void checkElements(const NetcdfFile& file, int variable, const std::string& block, std::int64_t nodes) {
+    std::size_t typeLength = 0;
+    if (nc_inq_attlen(file.id(), variable, "elem_type", &typeLength) == NC_NOERR &&
+        typeLength > MAX_STR_LENGTH)
+        file.fail("the type of element block " + block + " has a name of " + std::to_string(typeLength) +
+                  " bytes");
+    const std::vector<std::int64_t> lengths = file.lengths(variable);
+    if (lengths.size() == 1) return;  // polygons and polyhedra, which aren't read
+    const std::int64_t elements = file.length("num_el_in_blk" + block);
+    const std::int64_t perElement = file.length("num_nod_per_el" + block);
+    if (lengths != std::vector{elements, perElement})
+        file.fail("the nodes of element block " + block + " aren't a table of its elements");
+    if (elements < 1 || perElement < 1) return;
     const std::int64_t step = std::max<std::int64_t>(1, kNodesAtOnce / perElement);
-    std::vector<std::int64_t> list;
-    for (std::int64_t first = 0; first < block.num_entry; first += step) {
-        const std::int64_t count = std::min(step, block.num_entry - first);
+    std::vector<long long> list;
+    for (std::int64_t first = 0; first < elements; first += step) {
+        const std::int64_t count = std::min(step, elements - first);
         list.resize(std::size_t(count * perElement));
-        if (ex_get_partial_conn(file, EX_ELEM_BLOCK, id, first + 1, count, list.data(), nullptr, nullptr) < 0)
-            return;
+        const std::array<std::size_t, 2> start{std::size_t(first), 0};
+        const std::array<std::size_t, 2> counts{std::size_t(count), std::size_t(perElement)};
+        if (const int error =
+                nc_get_vara_longlong(file.id(), variable, start.data(), counts.data(), list.data());
+            error != NC_NOERR)
+            file.fail("the nodes of element block " + block + " can't be read: " + nc_strerror(error));
         for (std::size_t i = 0; i < list.size(); ++i)
             if (list[i] < 1 || list[i] > nodes)
-                throw InputError(path + ": element " +
-                                 std::to_string(first + std::int64_t(i) / perElement + 1) +
-                                 " (counted from 1) of block " + std::to_string(id) + " names node " +
-                                 std::to_string(list[i]) + "; there are " + std::to_string(nodes));
+                file.fail("element " + std::to_string(first + std::int64_t(i) / perElement + 1) +
+                          " of block " + block + " (both counted from 1) names node " +
+                          std::to_string(list[i]) + "; there are " + std::to_string(nodes));
     }
 }
 
-void checkElementNodes(const std::string& path, int file, const ex_init_params& parameters) {
-    std::vector<std::int64_t> ids(std::size_t(std::max<std::int64_t>(0, parameters.num_elem_blk)));
-    if (ids.empty() || ex_get_ids(file, EX_ELEM_BLOCK, ids.data()) < 0) return;
-    for (const std::int64_t id : ids) checkElementNodes(path, file, id, parameters.num_nodes);
+void checkElements(const NetcdfFile& file) {
+    const std::int64_t nodes = std::max<std::int64_t>(0, file.length("num_nodes"));
+    for (int variable = 0; variable < file.variableCount(); ++variable) {
+        const std::string name = file.nameOf(variable), blockIds = "eb_prop1", table = "connect";
+        if (name == blockIds && file.lengths(variable) != std::vector{file.length("num_el_blk")})
+            file.fail("the list of element blocks hasn't the length that is declared");
+        if (!name.starts_with(table) || name.size() == table.size()) continue;
+        const std::string block = name.substr(table.size());
+        if (block.find_first_not_of("0123456789") == std::string::npos)
+            checkElements(file, variable, block, nodes);
+    }
 }
 
 /// Adds the names of the zone's fields.
@@ -101,27 +160,17 @@ CgnsFields listFields(const std::string& path) {
 
 void checkExodusFile(const std::string& path) {
     // The Exodus library prints when it can't open a file, whatever its options say; the one below doesn't.
-    int dataset = 0;
     checkNetcdfSize(path);
-    if (const int error = nc_open(path.c_str(), NC_NOWRITE, &dataset); error != NC_NOERR)
-        throw InputError(path + ": damaged: the NetCDF library can't open it: " + nc_strerror(error));
-    nc_close(dataset);
+    checkElements(NetcdfFile(path));
     ex_opts(0);
     int computeWordSize = 8, fileWordSize = 0;
     float version = 0;
     const int file = ex_open(path.c_str(), EX_READ, &computeWordSize, &fileWordSize, &version);
     if (file < 0) throw InputError(path + ": damaged: the Exodus library can't open it");
     ex_init_params parameters{};
-    ex_set_int64_status(file, EX_ALL_INT64_API);
     const int status = ex_get_init_ext(file, &parameters);
-    try {
-        if (status < 0) throw InputError(path + ": damaged: the Exodus library finds no mesh in it");
-        checkElementNodes(path, file, parameters);
-    } catch (...) {
-        ex_close(file);
-        throw;
-    }
     ex_close(file);
+    if (status < 0) throw InputError(path + ": damaged: the Exodus library finds no mesh in it");
 }
 
 CgnsFields checkCgnsFile(const std::string& path) {

@@ -58,11 +58,11 @@ VtkSource openCgns(const std::string& path) {
 }
 
 VtkSource openEnSight(const std::string& path) {
-    EnSightCase files = checkEnSightCase(path);
+    std::vector<std::string> warnings = findCutOffFiles(checkEnSightCase(path));
     auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
     reader->SetCaseFileName(path.c_str());
     reader->ReadAllVariablesOn();
-    return {reader, "EnSight", {}, std::move(files.warnings)};
+    return {reader, "EnSight", {}, std::move(warnings)};
 }
 
 VtkSource openFoam(const std::string& path) {
