@@ -485,6 +485,8 @@ TEST(DefaultLimits, AFileThatIsCutOffMeanwhileIsAnError) {
     const std::string text =
         replaced(twoTets().text(), "</VTKFile>", "<!--" + std::string(4 << 20, '-') + "--></VTKFile>");
     const std::string path = folder.write("mesh.vtu", text);
+    std::filesystem::resize_file(path,
+                                 100);  // from now on zeros follow, and it is damaged whenever it is read
     std::atomic<bool> end{false};
     std::thread cutter([&] {
         while (!end) {
