@@ -46,6 +46,13 @@ void forEachNode(CellList& cells, const Execution& execution, const Visit& visit
     });
 }
 
+template <class Item>
+void keepOnly(const std::vector<std::int32_t>& kept, std::vector<Item>& items) {
+    std::vector<Item> chosen(kept.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) chosen[i] = items[std::size_t(kept[i])];
+    items = std::move(chosen);
+}
+
 /// Drops the nodes that no cell uses and renumbers. Returns the old index of every node that stays; empty
 /// when all do.
 std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& block, std::size_t blockIndex,
@@ -68,14 +75,8 @@ std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& blo
     }
     if (kept.size() == block.points.size()) return {};
     forEachNode(block.cells, execution, [&](std::int32_t& node) { node = newIndex[std::size_t(node)]; });
-    std::vector<Vec3d> points(kept.size());
-    for (std::size_t i = 0; i < kept.size(); ++i) points[i] = block.points[std::size_t(kept[i])];
-    block.points = std::move(points);
-    if (!block.nodeIds.empty()) {
-        std::vector<std::int64_t> ids(kept.size());
-        for (std::size_t i = 0; i < kept.size(); ++i) ids[i] = block.nodeIds[std::size_t(kept[i])];
-        block.nodeIds = std::move(ids);
-    }
+    keepOnly(kept, block.points);
+    if (!block.nodeIds.empty()) keepOnly(kept, block.nodeIds);
     return kept;
 }
 
@@ -95,7 +96,7 @@ void gatherTuples(Field& field, const std::vector<Index>& items, const Execution
 
 /// The merged index of every point of every block: points with one number are one, where all have numbers
 /// and these are dense.
-/// Gives the number of merged points.
+/// @param count receives the number of merged points.
 std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>& blocks,
                                                      std::size_t& count) {
     constexpr std::int64_t kMostNumbersAPoint = 64;  // a table of more isn't worth the memory
