@@ -93,11 +93,7 @@ class Splitter {
                 fanPolygon();
             }
         }
-        if (triangles_.empty()) return;
-        const bool eitherWay = kind == CellKind::wedge || kind == CellKind::polyhedron;
-        if (eitherWay && volumeInside(centreOfNodes()) < 0)
-            for (Triangle& triangle : triangles_) std::swap(triangle[1], triangle[2]);
-        coneTriangles(kind == CellKind::polyhedron);
+        coneTriangles(kind);
     }
 
   private:
@@ -114,7 +110,10 @@ class Splitter {
     void fanPolygon();
     void fanPolyhedron(std::span<const std::int32_t> stream);
     void orientFaces(std::vector<std::vector<std::int32_t>>& faces) const;
-    void coneTriangles(bool isPolyhedron);
+    void coneTriangles(CellKind kind);
+    void turnTriangles() {
+        for (Triangle& triangle : triangles_) std::swap(triangle[1], triangle[2]);
+    }
 
     void emit(const Tet& tet) {
         for (std::size_t i = 0; i < 4; ++i)
@@ -248,7 +247,10 @@ void Splitter::fanPolygon() {
 /// Emits the cone over the faces' triangles from the first of these that serves: a node, in coordinate order,
 /// from which every tet has the sign of the cell and none grazes a face; the centre; a node from which some
 /// tets are slivers, then flat; for a polyhedron the centre whatever it does; the smallest node as it is.
-void Splitter::coneTriangles(bool isPolyhedron) {
+void Splitter::coneTriangles(CellKind kind) {
+    if (triangles_.empty()) return;
+    const bool isPolyhedron = kind == CellKind::polyhedron;
+    const bool eitherWay = isPolyhedron || kind == CellKind::wedge;
     const auto smaller = [&](std::int32_t a, std::int32_t b) { return before(a, b); };
     const auto grazes = [&](std::int32_t node) {
         return std::find(grazing_.begin(), grazing_.end(), node) != grazing_.end();
@@ -256,13 +258,18 @@ void Splitter::coneTriangles(bool isPolyhedron) {
     const std::int32_t smallest = *std::min_element(nodes_.begin(), nodes_.end(), smaller);
     const auto smallestSigns = coneSigns(place(smallest), smallest);
     if (smallestSigns.first * smallestSigns.second > 0 && !grazes(smallest)) {
+        if (eitherWay && smallestSigns.first < 0) turnTriangles();
         emitCone(smallest);
         return;
     }
     std::sort(nodes_.begin(), nodes_.end(), smaller);
     nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
     const Vec3d centre = centreOfNodes();
-    const double volume = volumeInside(centre);
+    double volume = volumeInside(centre);
+    if (eitherWay && volume < 0) {
+        turnTriangles();
+        volume = -volume;
+    }
     const auto allKeepSign = [&](std::pair<int, int> signs) {
         return volume < 0 ? signs.second < 0 : signs.first > 0;
     };
