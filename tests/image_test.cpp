@@ -182,7 +182,7 @@ struct SliceCase {
 
 TEST(Slice, ShowsTheFieldWithItsFirstAxisToTheRightAndTheSecondUp) {
     SliceCase scene;
-    const NearestPointIndex nearest(scene.mesh);
+    const NearestOnDemand nearest(scene.mesh, 1);
     const Reconstruction reconstruction(scene.mesh, scene.fields, scene.tree, scene.store, nearest);
     for (int axis = 0; axis < 3; ++axis) {
         SliceOptions options;
@@ -215,7 +215,7 @@ TEST(Slice, ShowsTheFieldWithItsFirstAxisToTheRightAndTheSecondUp) {
 
 TEST(Slice, OutlinesFollowTheBricks) {
     SliceCase scene;
-    const NearestPointIndex nearest(scene.mesh);
+    const NearestOnDemand nearest(scene.mesh, 1);
     const Reconstruction reconstruction(scene.mesh, scene.fields, scene.tree, scene.store, nearest);
     SliceOptions options;
     options.positionWorld = 0.7;
@@ -233,7 +233,7 @@ TEST(Slice, OutlinesFollowTheBricks) {
 
 TEST(Slice, OptionsOutOfRangeAreRefused) {
     SliceCase scene;
-    const NearestPointIndex nearest(scene.mesh);
+    const NearestOnDemand nearest(scene.mesh, 1);
     const Reconstruction reconstruction(scene.mesh, scene.fields, scene.tree, scene.store, nearest);
     SliceOptions options;
     options.axis = 3;

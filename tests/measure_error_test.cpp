@@ -27,8 +27,8 @@ Measured measure(const TetMesh& mesh, std::vector<int> fields, const RefineOptio
                                           channels, execution, statistics);
     MeasureOptions measureOptions;
     measureOptions.leafErrors = leafErrors;
-    result.report =
-        measureError(mesh, fields, result.tree, store, NearestPointIndex(mesh), execution, measureOptions);
+    result.report = measureError(mesh, fields, result.tree, store, NearestOnDemand(mesh, threads), execution,
+                                 measureOptions);
     return result;
 }
 

@@ -125,6 +125,15 @@ inline BrickResult makeResult(const Vec3d& origin, double spacing, int brickCell
     return result;
 }
 
+/// Values first, first + 1, ... of the channels at a point outside the mesh.
+inline void addExtension(BrickStore& store, int level, const Vec3i& p, float first) {
+    Tile& tile = store.extension()[{level, floorDiv(p, kTileSize)}];
+    if (!tile.values) tile.values = std::make_unique<float[]>(std::size_t(store.channels()) * kTilePoints);
+    tile.cover(offsetInTile(p));
+    for (int c = 0; c < store.channels(); ++c)
+        tile.values[std::size_t(c * kTilePoints + offsetInTile(p))] = first + float(c);
+}
+
 inline const std::vector<OutputField> kScalar{{"f", "f", "point", 1, 0}};
 // A scalar, a vector and a tensor: ten channels.
 inline const std::vector<OutputField> kMixed{

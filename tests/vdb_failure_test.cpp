@@ -64,7 +64,7 @@ TEST_F(VdbFailureTest, FailedWriteLeavesTheOldFileAlone) {
         for (const char* name : {"out.vdb", "new.vdb"}) {
             BrickResult result = makeResult({0, 0, 0}, 1, 16, nestedLeaves(), 10);
             const FileSizeLimit full(limit);
-            EXPECT_THROW(writeVdb(file(name), kMixed, result, nullptr, nullptr, {}, {}), IoError);
+            EXPECT_THROW(writeVdb(file(name), kMixed, result, {}, {}), IoError);
         }
         EXPECT_EQ(readBytes(file("out.vdb")), "precious");
         EXPECT_EQ(fileCount(), 1u);
@@ -76,7 +76,7 @@ TEST_F(VdbFailureTest, CancelledWriteLeavesNothing) {
     Execution execution;
     execution.cancel = &cancel;
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
-    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, execution), Cancelled);
+    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, {}, execution), Cancelled);
     EXPECT_EQ(fileCount(), 0u);
 }
 
@@ -98,7 +98,7 @@ TEST_F(VdbFailureTest, TemporaryFilesCanBeRemovedBySignalHandlers) {
 
 TEST_F(VdbFailureTest, DamagedFilesAreRefused) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
-    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kScalar, result, {}, {});
     const std::string good = readBytes(file("out.vdb"));
     for (std::size_t length : {std::size_t(0), std::size_t(5), std::size_t(21), std::size_t(56),
                                std::size_t(57), std::size_t(1000), good.size() - 1}) {
@@ -161,7 +161,7 @@ TEST_F(VdbFailureTest, FilesOfOtherProgramsGiveTheirLattice) {
 
 TEST_F(VdbFailureTest, FileSavedAgainByAnotherProgramStillReads) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, valueAt, everywhere);
-    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kMixed, result, {}, {});
     openvdb::io::File source(file("out.vdb"));
     source.open(false);
     const openvdb::MetaMap::Ptr metadata = source.getMetadata();
@@ -174,7 +174,7 @@ TEST_F(VdbFailureTest, FileSavedAgainByAnotherProgramStillReads) {
 
 TEST_F(VdbFailureTest, EmptyTreeGivesAFileWithoutVoxels) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {}, 1);
-    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kScalar, result, {}, {});
     EXPECT_EQ(readVdb(file("out.vdb")).tree.leafCount(), 0u);
 }
 
@@ -182,7 +182,7 @@ TEST_F(VdbFailureTest, VdbPrintListsTheGrids) {
     if (std::system("command -v vdb_print > /dev/null 2>&1") != 0)
         GTEST_SKIP() << "vdb_print isn't installed";
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10);
-    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kMixed, result, {}, {});
     ASSERT_EQ(std::system(("vdb_print -l " + file("out.vdb") + " > " + file("list.txt")).c_str()), 0);
     const std::string list = readBytes(file("list.txt"));
     for (const char* name : {"T_level_0", "U_level_3", "S_5_level_2", "coverage_level_1", "tessera_bricks"})

@@ -1,4 +1,5 @@
 #include "io/vdb_file.h"
+#include "io/shape_output.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
@@ -49,8 +50,7 @@ TEST_F(VdbFileTest, LevelsRoundTripIsBitExact) {
         options.sampleFormat = brickCells == 8 ? "" : "r16f";
         options.criterion = "error 1%";
         options.sourceFile = "mesh \xc3\xa4.vtu";
-        const VdbWriteResult written =
-            writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
+        const VdbWriteResult written = writeVdb(file("out.vdb"), kMixed, result, options, {});
         EXPECT_TRUE(written.notes.empty());
         EXPECT_EQ(written.fileBytes, std::int64_t(fs::file_size(file("out.vdb"))));
         EXPECT_EQ(result.store.coveredPoints(), 0) << "tiles are freed on the way";
@@ -81,7 +81,7 @@ TEST_F(VdbFileTest, BoundsComeBackExactlyAndAreAbsentWithoutOnes) {
         VdbWriteOptions options;
         if (bounded)
             options.boundsWorld = Box3d{{-1.0 / 3, -2e-300, 0.1}, {1.0 / 7, 1e22, 0.30000000000000004}};
-        writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
+        writeVdb(file("out.vdb"), kScalar, result, options, {});
         const VdbFile read = readVdb(file("out.vdb"));
         ASSERT_EQ(read.boundsWorld.has_value(), bounded);
         if (!bounded) continue;
@@ -95,7 +95,7 @@ TEST_F(VdbFileTest, FlatPlanKeepsVoxelsAndBytesWithinTheirBounds) {
     std::vector<BrickKey> leaves;
     for (int i = 0; i < 64; ++i) leaves.push_back({0, {i & 3, i >> 2 & 3, i >> 4}});
     const BrickTree tree(Vec3d(0), 0.5, 64, std::move(leaves));
-    VdbWriteOptions options;
+    OutputShape options;
     const auto level = [&](int channels) {
         const FlatGridPlan plan = planFlatGrid(tree, channels, options);
         EXPECT_EQ(plan.points, std::int64_t(1) << (24 - 3 * plan.level));
@@ -117,7 +117,7 @@ TEST_F(VdbFileTest, FlatPlanKeepsVoxelsAndBytesWithinTheirBounds) {
 TEST_F(VdbFileTest, ReportComesBackExactly) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {{0, {0, 0, 0}}}, 1);
     result.report = sampleReport();
-    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kScalar, result, {}, {});
     const ErrorReport expected = sampleReport();
     const ErrorReport read = readVdb(file("out.vdb")).report;
     ASSERT_EQ(read.fields.size(), 1u);
@@ -149,7 +149,7 @@ TEST_F(VdbFileTest, VoxelIsFieldAtItsLatticePoint) {
     const Vec3d origin(0.3, -0.7, 11);
     BrickResult result = makeResult(origin, 0.25, 8, nestedLeaves(), 1);
     const BrickTree tree = result.tree;
-    writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kScalar, result, {}, {});
     for (int level = 0; level < 4; ++level) {
         const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f_level_" + std::to_string(level));
         ASSERT_TRUE(grid);
@@ -193,7 +193,7 @@ float holedAsRead(int level, const Vec3i& p, int channel) {
 
 TEST_F(VdbFileTest, ValuesThatAreNotFiniteAreInactiveButCovered) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {{0, {0, 0, 0}}}, 10, holed, everywhere);
-    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, {}, {});
+    writeVdb(file("out.vdb"), kMixed, result, {}, {});
     const auto scalar = findGrid<openvdb::FloatGrid>(file("out.vdb"), "T_level_0");
     const auto vector = findGrid<openvdb::Vec3SGrid>(file("out.vdb"), "U_level_0");
     EXPECT_EQ(scalar->activeVoxelCount(), 448u);
@@ -209,12 +209,13 @@ TEST_F(VdbFileTest, ExtensionIsActiveButNotCovered) {
     // Inside the level's bricks, outside all bricks, and one whose vector isn't finite.
     Vec3i uncovered = result.tree.ownedPoints({0, {0, -8, -8}}).min;
     while (coveredAt(0, uncovered)) ++uncovered.z;
-    ExtensionPoints extension;
-    extension.points = {{uncovered, 0, 0}, {{100, 200, -300}, 0, 10}, {{-40, 0, 0}, 3, 20}};
-    extension.values.resize(30);
-    for (std::size_t i = 0; i < 30; ++i) extension.values[i] = float(i) + 0.5f;
-    extension.values[21] = kNaN;
-    writeVdb(file("out.vdb"), kMixed, result, &extension, nullptr, {}, {});
+    addExtension(result.store, 0, uncovered, 0.5f);
+    addExtension(result.store, 0, {100, 200, -300}, 10.5f);
+    addExtension(result.store, 3, {-40, 0, 0}, 20.5f);
+    result.store.extension()[{3, {-5, 0, 0}}].values[kTilePoints] = kNaN;
+    VdbWriteOptions options;
+    options.layers = 1;
+    writeVdb(file("out.vdb"), kMixed, result, options, {});
 
     const auto fine = findGrid<openvdb::FloatGrid>(file("out.vdb"), "T_level_0");
     const auto tensor = findGrid<openvdb::FloatGrid>(file("out.vdb"), "S_3_level_0");
@@ -229,14 +230,24 @@ TEST_F(VdbFileTest, ExtensionIsActiveButNotCovered) {
     EXPECT_EQ(findGrid<openvdb::FloatGrid>(file("out.vdb"), "T_level_3")->tree().getValue(coarse), 20.5f);
     EXPECT_FALSE(findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage_level_0")->tree().isValueOn(inside));
     EXPECT_FALSE(findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage_level_0")->tree().isValueOn(outside));
-    expectStored(readVdb(file("out.vdb")), 10, valueAt, coveredAt);
+    const VdbFile read = readVdb(file("out.vdb"));
+    expectStored(read, 10, valueAt, coveredAt);
+    EXPECT_EQ(read.layers, 1);
+    EXPECT_EQ(read.store.extension().size(), 3u);
+    const Tile* tile = read.store.extensionAt(3, {-40, 0, 0});
+    ASSERT_TRUE(tile);
+    EXPECT_EQ(tile->channel(0)[0], 20.5f);
+    EXPECT_TRUE(std::isnan(tile->channel(2)[0])) << "the vector is inactive as a whole";
+    EXPECT_EQ(tile->channel(4)[0], 24.5f);
+    EXPECT_TRUE(read.store.extensionAt(0, uncovered));
+    EXPECT_TRUE(read.store.extensionAt(0, {100, 200, -300}));
 }
 
 TEST_F(VdbFileTest, BackgroundIsWrittenAndInactiveVoxelsCarryIt) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {{0, {0, 0, 0}}}, 10);
     VdbWriteOptions options;
     options.background = -7.25f;
-    writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
+    writeVdb(file("out.vdb"), kMixed, result, options, {});
     const auto scalar = findGrid<openvdb::FloatGrid>(file("out.vdb"), "T_level_0");
     const auto vector = findGrid<openvdb::Vec3SGrid>(file("out.vdb"), "U_level_0");
     EXPECT_EQ(scalar->background(), -7.25f);
@@ -253,7 +264,7 @@ TEST_F(VdbFileTest, BackgroundIsWrittenAndInactiveVoxelsCarryIt) {
 TEST_F(VdbFileTest, TinyVoxelsGetASmallerUnit) {
     BrickResult result = makeResult({1e-5, 2e-5, -3e-5}, 1e-7, 8, nestedLeaves(), 1);
     const BrickTree tree = result.tree;
-    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {});
+    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, {}, {});
     EXPECT_EQ(written.unitScale, 1e4);
     ASSERT_EQ(written.notes.size(), 1u);
     EXPECT_NE(written.notes[0].find("10000"), std::string::npos) << written.notes[0];
@@ -273,14 +284,14 @@ TEST_F(VdbFileTest, UnitScaleOfTheCallerHolds) {
     BrickResult result = makeResult({1, 2, 3}, 0.5, 8, {{0, {0, 0, 0}}}, 1);
     VdbWriteOptions options;
     options.unitScale = 1000;
-    EXPECT_EQ(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {}).unitScale, 1000);
+    EXPECT_EQ(writeVdb(file("out.vdb"), kScalar, result, options, {}).unitScale, 1000);
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f_level_0");
     EXPECT_EQ(grid->indexToWorld(openvdb::Coord(2, 0, 0)), openvdb::Vec3d(2000, 2000, 3000));
     options.unitScale = 1e-5;
     BrickResult second = makeResult({1, 2, 3}, 0.5, 8, {{0, {0, 0, 0}}}, 1);
-    EXPECT_THROW(writeVdb(file("second.vdb"), kScalar, second, nullptr, nullptr, options, {}), InputError);
+    EXPECT_THROW(writeVdb(file("second.vdb"), kScalar, second, options, {}), InputError);
     options.unitScale = -1;
-    EXPECT_THROW(writeVdb(file("second.vdb"), kScalar, second, nullptr, nullptr, options, {}), InputError);
+    EXPECT_THROW(writeVdb(file("second.vdb"), kScalar, second, options, {}), InputError);
     EXPECT_FALSE(fs::exists(file("second.vdb")));
 }
 
@@ -291,8 +302,7 @@ TEST_F(VdbFileTest, VoxelsFromSmallToLargeCanBeWritten) {
             BrickResult result = makeResult({0, 0, 0}, spacing, 8, {{0, {0, 0, 0}}}, 1);
             VdbWriteOptions options;
             options.upAxis = axis;
-            const VdbWriteResult written =
-                writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
+            const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, options, {});
             const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f_level_0");
             EXPECT_NEAR(grid->voxelSize().x() / (spacing * written.unitScale), 1, 1e-12);
             EXPECT_GE(grid->voxelSize().x(), 1.9e-5);
@@ -304,7 +314,7 @@ TEST_F(VdbFileTest, VoxelsFromSmallToLargeCanBeWritten) {
 TEST_F(VdbFileTest, SaysWhatDistanceFromTheOriginCosts) {
     const auto write = [&](double far) {
         BrickResult result = makeResult({0, far, 0}, 0.05, 8, {{0, {0, 0, 0}}}, 1);
-        return writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {}).notes;
+        return writeVdb(file("out.vdb"), kScalar, result, {}, {}).notes;
     };
     EXPECT_TRUE(write(1e6).empty());
     // At 1e14 places are multiples of 2^-6: a voxel of 0.05 becomes one of 3 / 64, off by 1/16 a voxel, 8 of
@@ -321,7 +331,7 @@ TEST_F(VdbFileTest, SaysWhatDistanceFromTheOriginCosts) {
 
 TEST_F(VdbFileTest, VoxelsTooSmallForAnyUnitAreRefused) {
     BrickResult result = makeResult({0, 0, 0}, 5e-322, 8, {}, 1);
-    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, {}, {}), InputError);
+    EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, {}, {}), InputError);
     EXPECT_EQ(fileCount(), 0u);
 }
 
@@ -331,7 +341,7 @@ TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
         const BrickTree tree = result.tree;
         VdbWriteOptions options;
         options.upAxis = axis;
-        writeVdb(file("out.vdb"), kMixed, result, nullptr, nullptr, options, {});
+        writeVdb(file("out.vdb"), kMixed, result, options, {});
         const auto turn = [&](const Vec3d& v) {
             return axis == UpAxis::y ? Vec3d(v.x, v.z, -v.y) : Vec3d(v.x, -v.z, v.y);
         };
@@ -370,13 +380,12 @@ TEST_F(VdbFileTest, OpenVdbWritesTheSameBytes) {
             makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, [](int level, const Vec3i& p, int channel) {
                 return channel == 0 ? kNaN : valueAt(level, p, channel);
             });  // a grid without values
-        ExtensionPoints outside;
-        outside.points = {{{-200, 3, 5}, 0, 0}, {{-1, -1, 0}, 2, 10}};
-        outside.values.assign(20, 1.5f);
+        addExtension(result.store, 0, {-200, 3, 5}, 1.5f);
+        addExtension(result.store, 2, {-1, -1, 0}, 1.5f);
         VdbWriteOptions options;
         options.halfFloat = toHalf;
         options.background = 0.25f;
-        writeVdb(file("ours.vdb"), kMixed, result, &outside, nullptr, options, {});
+        writeVdb(file("ours.vdb"), kMixed, result, options, {});
         std::ifstream stream(file("ours.vdb"), std::ios::binary);
         openvdb::io::Stream ours(stream, false);  // keeps the grids' order
         openvdb::io::File theirs(file("theirs.vdb"));
@@ -393,11 +402,10 @@ TEST_F(VdbFileTest, HalfFloatsReadBack) {
     // Integers to 2048 are exact in half floats.
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, smallIntegers, coveredAt);
     VdbWriteOptions options;
-    const std::int64_t full =
-        writeVdb(file("full.vdb"), kMixed, result, nullptr, nullptr, options, {}).fileBytes;
+    const std::int64_t full = writeVdb(file("full.vdb"), kMixed, result, options, {}).fileBytes;
     result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, smallIntegers, coveredAt);
     options.halfFloat = true;
-    const VdbWriteResult half = writeVdb(file("half.vdb"), kMixed, result, nullptr, nullptr, options, {});
+    const VdbWriteResult half = writeVdb(file("half.vdb"), kMixed, result, options, {});
     EXPECT_TRUE(half.notes.empty());
     EXPECT_LT(half.fileBytes, full);
     EXPECT_TRUE(findGrid<openvdb::FloatGrid>(file("half.vdb"), "T_level_0")->saveFloatAsHalf());
@@ -414,7 +422,7 @@ TEST_F(VdbFileTest, ValuesThatAreLeftOutDontDecideOnHalfFloats) {
         });
     VdbWriteOptions options;
     options.halfFloat = true;
-    EXPECT_TRUE(writeVdb(file("half.vdb"), kMixed, result, nullptr, nullptr, options, {}).notes.empty());
+    EXPECT_TRUE(writeVdb(file("half.vdb"), kMixed, result, options, {}).notes.empty());
     EXPECT_TRUE(findGrid<openvdb::Vec3SGrid>(file("half.vdb"), "U_level_0")->saveFloatAsHalf());
 }
 
@@ -422,7 +430,7 @@ TEST_F(VdbFileTest, ValuesBeyondHalfFloatsStayFull) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1, pressures, coveredAt);
     VdbWriteOptions options;
     options.halfFloat = true;
-    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, nullptr, nullptr, options, {});
+    const VdbWriteResult written = writeVdb(file("out.vdb"), kScalar, result, options, {});
     ASSERT_EQ(written.notes.size(), 1u);
     EXPECT_NE(written.notes[0].find("65504"), std::string::npos);
     expectStored(readVdb(file("out.vdb")), 1, pressures, coveredAt);

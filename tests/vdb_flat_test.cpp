@@ -1,5 +1,6 @@
 #include <glm/vector_relational.hpp>
 
+#include "brick/flatten.h"
 #include "io/vdb_file.h"
 #include "vdb_case.h"
 
@@ -48,24 +49,48 @@ bool deepInWide(const Vec3i& p) {
 struct FlatCase {
     std::vector<int> fields{0};
     TetMesh mesh;
-    NearestPointIndex nearest;
+    BrickTree bricks;
     BrickResult result;
-    Reconstruction reconstruction;
-    FlatCase(const Box3d& box, CoverFunction covered)
+    CoverFunction covered;
+    FlatCase(const Box3d& box, CoverFunction coverFunction)
         : mesh(linearMesh({box.min * kSpacing, box.max * kSpacing})),
-          nearest(mesh),
-          result(makeResult({0, 0, 0}, kSpacing, 8, nestedLeaves(), 1, linear, covered)),
-          reconstruction(mesh, fields, result.tree, result.store, nearest) {}
+          result(makeResult({0, 0, 0}, kSpacing, 8, nestedLeaves(), 1, linear, coverFunction)),
+          covered(coverFunction) {
+        bricks = result.tree;
+    }
+    void flatten(const FlattenOptions& options, const Execution& execution = {}) {
+        const NearestOnDemand nearest(mesh, 1);
+        const CoverageSource coverage = [&](const Lattice& lattice, std::span<const IndexBox> boxes,
+                                            const BlockSink& sink) {
+            for (std::size_t i = 0; i < boxes.size(); ++i) {
+                Block block{lattice, boxes[i], 0, {}, {}};
+                Vec3i p;
+                for (p.z = block.box.min.z; p.z < block.box.max.z; ++p.z)
+                    for (p.y = block.box.min.y; p.y < block.box.max.y; ++p.y)
+                        for (p.x = block.box.min.x; p.x < block.box.max.x; ++p.x)
+                            block.coverage.push_back(covered(options.level, p));
+                sink(i, block);
+            }
+        };
+        FlatBricks flat =
+            tessera::flatten(mesh, fields, result.tree, result.store, nearest, coverage, options, execution);
+        result.bricks = std::exchange(result.tree, std::move(flat.tree));
+        result.store = std::move(flat.store);
+        result.flatLevel = options.level;
+    }
 };
+
+VdbWriteOptions flatOptions(int layers) {
+    VdbWriteOptions options;
+    options.layout = VdbLayout::flat;
+    options.layers = layers;
+    return options;
+}
 
 TEST_F(VdbFlatTest, FlatLayoutReconstructsCoarseBricks) {
     FlatCase flat(kWide, wide);
-    VdbWriteOptions options;
-    options.layout = VdbLayout::flat;
-    const BrickTree tree = flat.result.tree;
-    const VdbWriteResult written =
-        writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
-    EXPECT_EQ(written.flatLevel, 0);
+    flat.flatten({0, {}, 0});
+    writeVdb(file("out.vdb"), kScalar, flat.result, flatOptions(0), {});
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
     const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
     ASSERT_TRUE(grid && coverage);
@@ -83,66 +108,78 @@ TEST_F(VdbFlatTest, FlatLayoutReconstructsCoarseBricks) {
     EXPECT_EQ(deep, 109 * 45 * 45) << "every point deep inside is there";
     const VdbFile read = readVdb(file("out.vdb"));
     EXPECT_EQ(read.layout, VdbLayout::flat);
-    expectSameTree(read.tree, tree);
+    ASSERT_TRUE(read.bricks);
+    expectSameTree(*read.bricks, flat.bricks);
+    EXPECT_EQ(read.store.coveredPoints(), std::int64_t(coverage->activeVoxelCount()));
     EXPECT_EQ(read.gridNames, (std::vector<std::string>{"coverage", "f"}));
     EXPECT_EQ(read.gridVoxels[1], std::int64_t(grid->activeVoxelCount()));
 }
 
-TEST_F(VdbFlatTest, FlatCoverageNeedsAllCornersInCoarseBricks) {
+TEST_F(VdbFlatTest, FlatCoverageIsThatOfTheMeshInCoarseBricksToo) {
     FlatCase flat(kSlab, slab);
-    VdbWriteOptions options;
-    options.layout = VdbLayout::flat;
-    const BrickTree tree = flat.result.tree;
-    writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
+    flat.flatten({0, {}, 0});
+    writeVdb(file("out.vdb"), kScalar, flat.result, flatOptions(0), {});
     const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
+    const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
     std::int64_t wrong = 0, covered = 0;
     for (int x = -64; x < 64; ++x)
         for (int y = -56; y < -16; y += 3)
             for (int z = -56; z < -16; z += 3) {
-                const BrickKey& key = tree.leaves()[std::size_t(tree.findLeafAt(Vec3d(x, y, z)))];
-                // Corners that the point is interpolated from.
-                const int step = 1 << key.level;
-                const Vec3i low = floorDiv(Vec3i(x, y, z), step) * step;
-                const Vec3i high = low + Vec3i(low.x != x, low.y != y, low.z != z) * step;
-                const bool expected = slab(0, low) && slab(0, high);
-                const bool found = coverage->tree().isValueOn(openvdb::Coord(x, y, z));
-                wrong += found != expected;
-                covered += found;
+                const bool expected = slab(0, {x, y, z});
+                const openvdb::Coord c(x, y, z);
+                wrong += coverage->tree().isValueOn(c) != expected || grid->tree().isValueOn(c) != expected;
+                covered += expected;
             }
     EXPECT_EQ(wrong, 0);
     EXPECT_GT(covered, 0);
 }
 
-TEST_F(VdbFlatTest, FlatExtensionFillsCutCellsOfCoarseBricks) {
-    FlatCase flat(kSlab, slab);
-    const ExtensionPoints extension =
-        extendOutside(flat.mesh, flat.fields, flat.result.tree, flat.result.store, flat.nearest, 1, {});
-    VdbWriteOptions options;
-    options.layout = VdbLayout::flat;
-    writeVdb(file("out.vdb"), kScalar, flat.result, &extension, &flat.reconstruction, options, {});
-    const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
-    const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
-    EXPECT_GT(grid->activeVoxelCount(), coverage->activeVoxelCount());
-    // A brick of level 3 has points at x = -16 (outside) and -8 (inside): all fine points between them carry
-    // a value.
-    for (int x = -15; x <= -8; ++x) {
-        EXPECT_TRUE(grid->tree().isValueOn(openvdb::Coord(x, -40, -40))) << x;
-        EXPECT_EQ(coverage->tree().isValueOn(openvdb::Coord(x, -40, -40)), x == -8) << x;
+// Every cell that the mesh touches has its eight voxels, whatever the size of the bricks there.
+TEST_F(VdbFlatTest, FlatExtensionLeavesNoGapBesideCoarseBricks) {
+    for (const int level : {0, 1}) {
+        FlatCase flat(kSlab, slab);
+        flat.flatten({level, {}, 1});
+        writeVdb(file("out.vdb"), kScalar, flat.result, flatOptions(1), {});
+        const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
+        const auto coverage = findGrid<openvdb::BoolGrid>(file("out.vdb"), "coverage");
+        EXPECT_GT(grid->activeVoxelCount(), coverage->activeVoxelCount());
+        const int step = 1 << level;
+        std::int64_t missing = 0, cells = 0;
+        const Box3d& box = kSlab;
+        for (int x = -11 / step - 1; x <= 10 / step; ++x)
+            for (int y = -63 / step - 1; y <= -2 / step; ++y)
+                for (int z = -63 / step - 1; z <= -2 / step; ++z) {
+                    const Vec3d low = Vec3d(x, y, z) * double(step), high = low + double(step);
+                    if (glm::any(glm::greaterThan(low, box.max)) || glm::any(glm::lessThan(high, box.min)))
+                        continue;
+                    ++cells;
+                    for (int c = 0; c < 8; ++c)
+                        missing += !grid->tree().isValueOn(
+                            openvdb::Coord(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)));
+                }
+        EXPECT_EQ(missing, 0) << "of " << cells << " cells";
+        EXPECT_GT(cells, 1000);
+        // Inside the mesh every voxel holds the linear field, but where a coarse cell ends outside.
+        std::int64_t wrong = 0;
+        for (auto it = grid->cbeginValueOn(); it; ++it) {
+            const openvdb::Coord c = it.getCoord();
+            const Vec3i p(c.x(), c.y(), c.z());
+            if (!slab(level, p)) continue;
+            wrong += !coverage->tree().isValueOn(c);
+            if (inside({kSlab.min + 8.0, kSlab.max - 8.0}, level, p))
+                wrong += !(std::abs(double(*it) - double(linear(level, p, 0))) <= 1e-5 * 40);
+        }
+        EXPECT_EQ(wrong, 0);
     }
 }
 
-TEST_F(VdbFlatTest, FlatSizeCanBeCapped) {
+TEST_F(VdbFlatTest, FlatGridOfACoarserLevelTakesEverySecondPoint) {
     FlatCase flat(kWide, wide);
-    VdbWriteOptions options;
-    options.layout = VdbLayout::flat;
-    options.maxFlatVoxels = 2 * 32 * 32 * 32;
-    const VdbWriteResult written =
-        writeVdb(file("out.vdb"), kScalar, flat.result, nullptr, &flat.reconstruction, options, {});
-    EXPECT_EQ(written.flatLevel, 1);
-    ASSERT_EQ(written.notes.size(), 1u);
+    flat.flatten({1, {}, 0});
+    writeVdb(file("out.vdb"), kScalar, flat.result, flatOptions(0), {});
     const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
     EXPECT_EQ(grid->voxelSize().x(), 2 * kSpacing);
-    EXPECT_LE(grid->activeVoxelCount(), std::uint64_t(options.maxFlatVoxels));
+    EXPECT_EQ(readVdb(file("out.vdb")).flatLevel, 1);
     std::int64_t wrong = 0, deep = 0;
     for (auto it = grid->cbeginValueOn(); it; ++it) {
         const openvdb::Coord c = it.getCoord();
@@ -159,19 +196,29 @@ TEST_F(VdbFlatTest, FlatSizeCanBeCapped) {
             ASSERT_TRUE(grid->tree().isValueOn(openvdb::Coord(x, y, -30))) << x << ' ' << y;
 }
 
+TEST_F(VdbFlatTest, FlatGridIsCroppedToTheBounds) {
+    FlatCase flat(kWide, wide);
+    const Box3d bounds{Vec3d(-20.5, -40, -40) * kSpacing, Vec3d(9, -12.25, -16) * kSpacing};
+    flat.flatten({0, bounds, 1});
+    writeVdb(file("out.vdb"), kScalar, flat.result, flatOptions(1), {});
+    const auto grid = findGrid<openvdb::FloatGrid>(file("out.vdb"), "f");
+    EXPECT_EQ(grid->evalActiveVoxelBoundingBox(),
+              openvdb::CoordBBox(openvdb::Coord(-21, -40, -40), openvdb::Coord(9, -12, -16)));
+    EXPECT_EQ(grid->activeVoxelCount(), 31u * 29u * 25u);
+}
+
 TEST_F(VdbFlatTest, SameBytesForAnyNumberOfThreads) {
     for (VdbLayout layout : {VdbLayout::levels, VdbLayout::flat}) {
         std::string first;
         for (int threads : {1, 2, 5, 16}) {
             FlatCase flat(kSlab, slab);
-            const ExtensionPoints extension = extendOutside(flat.mesh, flat.fields, flat.result.tree,
-                                                            flat.result.store, flat.nearest, 1, {});
             VdbWriteOptions options;
             options.layout = layout;
             Execution execution;
             execution.threads = threads;
+            if (layout == VdbLayout::flat) flat.flatten({0, {}, 2}, execution);
             const std::string path = file("threads_" + std::to_string(threads) + ".vdb");
-            writeVdb(path, kScalar, flat.result, &extension, &flat.reconstruction, options, execution);
+            writeVdb(path, kScalar, flat.result, options, execution);
             const std::string bytes = readBytes(path);
             if (first.empty()) first = bytes;
             EXPECT_TRUE(bytes == first) << threads;

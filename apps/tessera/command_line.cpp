@@ -258,15 +258,13 @@ void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
 void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
     command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")
         ->required();
-    command.add_option("vdb", arguments.vdbPath, "the .vdb file (layout levels)")->required();
+    command.add_option("vdb", arguments.vdbPath, "the .vdb file")->required();
     addTimeStep(command, arguments.timeStep);
-    command.add_option("--samples", arguments.samples, "stored voxels to evaluate one by one")
-        ->check(CLI::Range(0, 1000000000))
-        ->capture_default_str();
     addCommonOptions(command, arguments.common);
     command.footer(
-        "Measures the error anew and compares it with what the file says. Exit code 2 when a claim does not "
-        "hold.\n"
+        "Checks every voxel against the mesh, reads the grids as other programs do, measures the error anew "
+        "and "
+        "compares it with what the file says. Exit code 2 when a claim does not hold.\n"
         "Example:\n  tessera verify mesh.vtu out.vdb");
 }
 
@@ -280,7 +278,7 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
 }
 
 void addPictureOptions(CLI::App& command, PictureArguments& a) {
-    command.add_option("vdb", a.input, "a .vdb file that tessera wrote (layout levels)")->required();
+    command.add_option("vdb", a.input, "a .vdb file that tessera wrote")->required();
     command.add_option("-o,--output", a.output, "the .png file")->required();
     command.add_option("--field", a.field, "the field (default: the first)");
     command

@@ -57,13 +57,13 @@ const OutputField& chooseField(const VdbFile& file, const std::string& name) {
 
 /// What a cell that is partly outside the mesh is filled from: the mesh itself, or, without it, fields
 /// without values.
-struct Outside {
+struct OutsideFields {
     TetMesh mesh;
     std::vector<int> fields;
 };
 
-Outside readOutside(const PictureArguments& arguments, const VdbFile& file, Session& session) {
-    Outside outside;
+OutsideFields readOutside(const PictureArguments& arguments, const VdbFile& file, Session& session) {
+    OutsideFields outside;
     if (arguments.mesh.empty()) {
         for (const OutputField& field : file.fields)
             outside.mesh.fields.push_back({field.name, FieldLocation::point, field.components, {}});
@@ -118,6 +118,7 @@ SliceOptions sliceOptions(const PictureArguments& arguments, const VdbFile& file
     slice.axis = arguments.axis == "x" ? 0 : arguments.axis == "y" ? 1 : 2;
     slice.pixels = arguments.pixels;
     slice.outlines = arguments.bricks;
+    if (file.bricks) slice.outlined = &*file.bricks;
     if (!arguments.bounds.empty()) {
         slice.boundsWorld = parseBounds(arguments.bounds);
     } else {
@@ -152,11 +153,9 @@ int runPicture(const PictureArguments& arguments) {
     Session session(arguments.common);
     checkWritable(arguments.output);
     const VdbFile file = readVdb(arguments.input);
-    if (file.layout != VdbLayout::levels)
-        throw InputError(fmt::format("{}: only files of layout levels can be drawn", arguments.input));
     const OutputField& field = chooseField(file, arguments.field);
     SliceOptions slice = sliceOptions(arguments, file);
-    const Outside outside = readOutside(arguments, file, session);
+    const OutsideFields outside = readOutside(arguments, file, session);
     if (!arguments.mesh.empty()) {
         // The mesh's own outline, by the cut plane through it.
         const SliceFrame frame = sliceFrame(file.tree, slice);
@@ -164,7 +163,7 @@ int runPicture(const PictureArguments& arguments) {
                                        {{0, 0, 0}, {frame.width, frame.height, 1}}, session.execution)
                              .coverage;
     }
-    const NearestPointIndex nearest(outside.mesh, session.execution.threadCount());
+    const NearestOnDemand nearest(outside.mesh, session.execution.threads);
     const Reconstruction reconstruction(outside.mesh, outside.fields, file.tree, file.store, nearest);
     const ScalarImage image = sampleField(file, field, arguments, reconstruction, slice, session.execution);
 

@@ -10,6 +10,7 @@
 #include "field_selection.h"
 #include "import_mesh.h"
 #include "io/atomic_file.h"
+#include "io/shape_output.h"
 #include "memory_plan.h"
 #include "output_paths.h"
 #include "predict_cost.h"
@@ -78,6 +79,7 @@ class ResampleRun {
     ImportedMesh read(const Step& step);
     RefineOptions stepOptions(const TetMesh& mesh, const FieldSelection& selection);
     VdbWriteOptions writeOptions() const;
+    OutputShape outputShape() const;
     void surveySeries(const std::vector<Step>& steps);
     void surveySpacing(const TetMesh& mesh);
     Json runStep(const Step& step);
@@ -167,10 +169,16 @@ RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection
 
 VdbWriteOptions ResampleRun::writeOptions() const {
     VdbWriteOptions options = settings_.write;
-    options.maxFlatBytes = budget_.flatBytes;
     options.boundsWorld = settings_.refine.boundsWorld;
+    options.layers = settings_.shape.layers;
     options.repair = encodeRepair(repair_);
     return options;
+}
+
+OutputShape ResampleRun::outputShape() const {
+    OutputShape shape = settings_.shape;
+    shape.maxFlatBytes = budget_.flatBytes;
+    return shape;
 }
 
 /// One lattice and one value range for all steps need a look at all of them first.
@@ -264,7 +272,7 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
     }
     times.planMs = timer.elapsedMs();
     PlanEstimate estimate = estimatePlan(tree, selection.channels);
-    const FlatGridPlan flat = planFlatGrid(tree, selection.channels, writeOptions());
+    const FlatGridPlan flat = planFlatGrid(tree, selection.channels, outputShape());
     estimate.flatPoints = flat.points;
     estimate.flatBytes = flat.bytes;
     if (!flat.note.empty()) notes.push_back(flat.note);
@@ -283,26 +291,35 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
 VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const FieldSelection& selection,
                                   BrickResult& result, StageTimes& times) {
     Timer timer;
-    std::optional<NearestPointIndex> nearest;
-    std::optional<Reconstruction> reconstruction;
-    std::optional<ExtensionPoints> extension;
-    const bool flat = settings_.write.layout == VdbLayout::flat;
-    const int layers = arguments_.extendLayers.value_or(flat ? 1 : 0);
-    if (flat || layers > 0) nearest.emplace(file.mesh, session_.execution.threadCount());
-    if (flat) reconstruction.emplace(file.mesh, selection.fields, result.tree, result.store, *nearest);
-    if (layers > 0)
-        extension = extendOutside(file.mesh, selection.fields, result.tree, result.store, *nearest, layers,
-                                  session_.execution);
+    const OutputShape shape = outputShape();
+    if (shape.layout == VdbLayout::flat) {
+        const FlatGridPlan plan = planFlatGrid(result.tree, selection.channels, shape);
+        if (plan.isCapped) session_.warn(fmt::format("{}: {}", step.output, plan.note));
+    }
+    shapeForFile(file.mesh, selection.fields, selection.outputs, resampler_, settings_.refine.bind, shape,
+                 result, session_.execution);
     times.extendMs = timer.restart();
     VdbWriteOptions options = writeOptions();
     options.sourceFile = std::filesystem::path(step.input).filename().string();
     // Where every target gives the same bits, naming one would make the file depend on the processor.
     if (!resampler_.targetsAgree()) options.target = result.target;
-    VdbWriteResult written =
-        writeVdb(step.output, selection.outputs, result, extension ? &*extension : nullptr,
-                 reconstruction ? &*reconstruction : nullptr, options, session_.execution);
+    VdbWriteResult written = writeVdb(step.output, selection.outputs, result, options, session_.execution);
     times.writeMs = timer.elapsedMs();
     return written;
+}
+
+/// The bound is judged by what the file shows.
+void judgeFile(const TetMesh& mesh, const FieldSelection& selection, const RefineOptions& options,
+               BrickResult& result) {
+    if (!result.bounded) return;
+    std::string exceeded = exceededBound(mesh, selection.fields, options, result.report);
+    if (exceeded.empty() && result.report.incomplete > 0)
+        exceeded = fmt::format("{} places beside voxels that it doesn't hold (--extend 1 adds them)",
+                               formatCount(result.report.incomplete));
+    if (exceeded.empty()) return;
+    result.bounded = false;
+    result.stoppedBecause =
+        "the samples keep to the bound, but the file, which is coarser or less precise, has " + exceeded;
 }
 
 Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
@@ -318,12 +335,14 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     const std::vector<LevelSummary> levels = summarizeLevels(result.tree, result.store);
     const std::int64_t sampleBytes = result.store.memoryBytes();
     const VdbWriteResult written = write(step, file, selection, result, times);
+    if (options.criterion == Criterion::error) judgeFile(file.mesh, selection, options, result);
     printResult(step, result, levels, written, times);
     if (options.criterion == Criterion::error) warnUnbounded(step, result);
 
     Json json = levelsJson(result.tree, levels);
     json["coverage"] = coverageJson(result.report);
     json["error"] = errorJson(result.report);
+    if (result.samplesReport) json["samples_error"] = errorJson(*result.samplesReport);
     if (options.criterion == Criterion::error)
         json["refinement"] = {{"max_error", options.maxError},
                               {"relative", options.maxErrorIsRelative},
@@ -334,7 +353,7 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     json["notes"] = result.notes;
     json["target"] = result.target;
     json["statistics"] = statisticsJson(result.statistics);
-    json["write"] = writeResultJson(written);
+    json["write"] = writeResultJson(written, result.flatLevel);
     json["sample_bytes"] = sampleBytes;
     return json;
 }
@@ -343,6 +362,8 @@ void ResampleRun::printResult(const Step& step, const BrickResult& result,
                               const std::vector<LevelSummary>& levels, const VdbWriteResult& written,
                               const StageTimes& times) {
     std::string text = levelsText(levels) + errorText(result.report);
+    if (result.samplesReport)
+        text += "  the samples before they became the file's voxels:\n" + errorText(*result.samplesReport);
     if (settings_.refine.criterion == Criterion::error)
         text += result.bounded
                     ? "  the error is within the bound\n"

@@ -6,13 +6,15 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "brick/measure_error.h"
-#include "check_samples.h"
 #include "commands.h"
 #include "import_mesh.h"
+#include "io/outside_reader.h"
+#include "io/report_json.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
 #include "registry/registry.h"
 #include "report_text.h"
+#include "verify/check_voxels.h"
 
 namespace tessera {
 
@@ -51,7 +53,9 @@ struct Comparison {
     std::string field, figure;
     double claimed = 0, measured = 0, allowed = 0;
     bool holds() const {
-        return std::abs(claimed - measured) <= allowed || (std::isnan(claimed) && std::isnan(measured));
+        // A figure that isn't finite stands as null in the file.
+        return std::abs(claimed - measured) <= allowed ||
+               (!std::isfinite(claimed) && !std::isfinite(measured));
     }
 };
 
@@ -65,6 +69,7 @@ std::vector<Comparison> compareReports(const TetMesh& mesh, std::span<const int>
     count("covered points", claimed.coveredPoints, measured.coveredPoints);
     count("nodes", claimed.nodes, measured.nodes);
     count("centroids", claimed.centroids, measured.centroids);
+    count("samples beside absent voxels", claimed.incomplete, measured.incomplete);
     if (claimed.fields.size() != measured.fields.size())
         throw InputError(fmt::format("the file's error report has {} fields, the file {}",
                                      claimed.fields.size(), measured.fields.size()));
@@ -106,20 +111,91 @@ Json comparisonJson(const std::vector<Comparison>& rows) {
     return list;
 }
 
-Json sampleJson(const SampleCheck& check) {
-    return {{"points", check.points},
-            {"covered", check.covered},
-            {"holes", check.holes},
-            {"spills", check.spills},
-            {"wrong_values", check.wrongValues},
-            {"largest_excess", check.largestExcess}};
+/// The figures that a program's reading must keep to.
+std::vector<Comparison> compareReading(const TetMesh& mesh, std::span<const int> fields,
+                                       const ErrorReport& claimed, const OutsideReading& reading) {
+    std::vector<Comparison> rows;
+    for (std::size_t f = 0; f < reading.max.size(); ++f) {
+        const FieldError& a = claimed.fields[f];
+        // At most, so what is below holds too. OpenVDB interpolates in 32-bit floats.
+        const double rounding = kFloatRounding * std::sqrt(double(a.components)) *
+                                largestValue(mesh.fields[std::size_t(fields[f])]);
+        rows.push_back({a.name, "max, by OpenVDB's sampler", a.max, std::max(a.max, reading.max[f]),
+                        kRounding * a.max + 2 * rounding + 1e-6 * a.range});
+    }
+    return rows;
 }
 
-std::string sampleText(const SampleCheck& check) {
-    return fmt::format(
-        "  {} stored points evaluated directly: {} covered, {} holes, {} spills, {} wrong values\n{}",
-        formatCount(check.points), formatCount(check.covered), check.holes, check.spills, check.wrongValues,
-        check.firstProblem.empty() ? "" : "  " + check.firstProblem + "\n");
+Json voxelsJson(const VoxelCheck& check, const OutsideReading& reading, std::int64_t strayValues) {
+    const PointCheck& s = check.samples;
+    return {{"covered", s.covered},
+            {"holes", s.holes},
+            {"spills", s.spills},
+            {"wrong_values", s.wrongValues},
+            {"undecided", s.undecided},
+            {"largest_share_of_allowed", s.largestShare},
+            {"derived", check.derived},
+            {"wrong_derived", check.wrongDerived},
+            {"missing_extension", check.missingDerived},
+            {"unexpected_extension", check.unexpected},
+            {"inactive_not_background", strayValues},
+            {"read_places", reading.places},
+            {"incomplete_places", reading.incomplete}};
+}
+
+std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, std::int64_t strayValues) {
+    const PointCheck& s = check.samples;
+    std::string text = fmt::format(
+        "  every voxel against the mesh: {} in the mesh; {} holes, {} spills, {} wrong values\n",
+        formatCount(s.covered), formatCount(s.holes), formatCount(s.spills), formatCount(s.wrongValues));
+    if (s.undecided > 0)
+        text += fmt::format("  {} voxels lie in elements too thin to check their values\n",
+                            formatCount(s.undecided));
+    if (check.derived + check.missingDerived + check.unexpected > 0)
+        text += fmt::format("  interpolated or outside the mesh: {}; {} wrong, {} missing, {} unexpected\n",
+                            formatCount(check.derived), formatCount(check.wrongDerived),
+                            formatCount(check.missingDerived), formatCount(check.unexpected));
+    if (strayValues > 0)
+        text += fmt::format("  {} inactive voxels don't hold the background\n", formatCount(strayValues));
+    text +=
+        fmt::format("  read by OpenVDB's sampler: {} nodes and centroids, {} of them beside absent voxels\n",
+                    formatCount(reading.places), formatCount(reading.incomplete));
+    for (const std::string& problem : {check.firstProblem, reading.firstProblem})
+        if (!problem.empty()) text += "  " + problem + "\n";
+    return text;
+}
+
+SampleFormat formatOf(const std::string& name) {
+    for (const SampleFormat format : {SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8})
+        if (nameOf(format) == name) return format;
+    return SampleFormat::r32f;
+}
+
+VoxelCheck check(const TetMesh& mesh, std::span<const int> fields, VdbFile& file,
+                 const Execution& execution) {
+    const Resampler& resampler = namedResampler(file.algorithm);
+    BindOptions bind;
+    bind.target = file.target;
+    bind.format = formatOf(file.sampleFormat);
+    StoredVoxels stored;
+    stored.tree = &file.tree;
+    stored.store = &file.store;
+    stored.bricks = file.bricks ? &*file.bricks : nullptr;
+    stored.flatLevel = file.flatLevel;
+    stored.boundsWorld = file.boundsWorld;
+    stored.layers = file.layers;
+    stored.bounds = {resampler.spillBoundVoxels(), resampler.placeBoundVoxels(), bind.format, {}, true};
+    if (file.halfFloat) {
+        const std::vector<bool> toHalf = gridsInHalf(file.fields, file.store);
+        std::size_t g = 0;
+        for (const OutputField& field : file.fields) {
+            const int grids = field.components == 3 ? 1 : field.components;
+            for (int k = 0; k < grids; ++k, ++g)
+                stored.bounds.isHalf.insert(stored.bounds.isHalf.end(), std::size_t(field.components / grids),
+                                            toHalf[g] ? 1 : 0);
+        }
+    }
+    return checkVoxels(mesh, fields, stored, resampler, bind, execution);
 }
 
 }  // namespace
@@ -128,9 +204,6 @@ int runVerify(const VerifyArguments& arguments) {
     checkOutputPaths({arguments.meshPath, arguments.vdbPath}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     VdbFile file = readVdb(arguments.vdbPath);
-    if (file.layout != VdbLayout::levels)
-        throw InputError(fmt::format(
-            "{}: only files of layout levels hold the exact samples that verify needs", arguments.vdbPath));
     ReadOptions options;
     options.timeStep = arguments.timeStep;
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
@@ -142,21 +215,27 @@ int runVerify(const VerifyArguments& arguments) {
     StageTimes times;
     times.readMs = timer.restart();
     const std::vector<int> fields = matchFields(mesh, file, arguments.meshPath);
-    const NearestPointIndex nearest(mesh, session.execution.threadCount());
+    const bool isFlat = file.layout == VdbLayout::flat;
+    const NearestOnDemand nearest(mesh, session.execution.threads);
     MeasureOptions measure;
     measure.boundsWorld = file.boundsWorld;
-    const ErrorReport measured =
-        measureError(mesh, fields, file.tree, file.store, nearest, session.execution, measure);
-    const std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
-    const SampleCheck samples = checkSamples(mesh, fields, file, namedResampler(file.algorithm),
-                                             file.halfFloat, arguments.samples, session.execution);
+    measure.outside = isFlat ? Outside::missing : Outside::nearest;
+    // Through JSON, as the file's claims went.
+    const ErrorReport measured = reportFromJson(
+        reportToJson(measureError(mesh, fields, file.tree, file.store, nearest, session.execution, measure)));
+    std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
+    const VoxelCheck voxels = check(mesh, fields, file, session.execution);
+    OutsideReading reading = readAsOutsider(arguments.vdbPath, file, mesh, fields, session.execution);
+    if (isFlat && file.layers == 0) reading.incomplete = 0;  // nothing is promised then
+    const std::vector<Comparison> read = compareReading(mesh, fields, file.report, reading);
+    rows.insert(rows.end(), read.begin(), read.end());
     times.verifyMs = timer.elapsedMs();
-    const bool holds = samples.good() &&
+    const bool holds = voxels.isGood() && reading.incomplete == 0 && file.strayValues == 0 &&
                        std::all_of(rows.begin(), rows.end(), [](const Comparison& r) { return r.holds(); });
 
     showRepair(arguments.meshPath, imported, repair, session);
     session.print(fmt::format("{} against {}\n", arguments.vdbPath, arguments.meshPath) +
-                  comparisonText(rows) + errorText(measured) + sampleText(samples) +
+                  comparisonText(rows) + errorText(measured) + voxelsText(voxels, reading, file.strayValues) +
                   (holds ? "verified: the file's claims hold\n" : ""));
     if (!arguments.common.jsonPath.empty()) {
         Json json{{"schema", 1},
@@ -167,7 +246,7 @@ int runVerify(const VerifyArguments& arguments) {
                   {"vdb_file", arguments.vdbPath},
                   {"holds", holds},
                   {"comparison", comparisonJson(rows)},
-                  {"samples", sampleJson(samples)},
+                  {"voxels", voxelsJson(voxels, reading, file.strayValues)},
                   {"coverage", coverageJson(measured)},
                   {"error", errorJson(measured)},
                   {"stages", stagesJson(times)}};

@@ -51,7 +51,6 @@ struct VerifyArguments {
     CommonOptions common;
     std::string meshPath, vdbPath;
     int timeStep = -1;
-    int samples = 20000;
 };
 struct TetsArguments {
     CommonOptions common;

@@ -141,7 +141,11 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.write.background = float(a.background);
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
     s.write.unitScale = a.unitScale.value_or(0);
-    s.write.maxFlatVoxels = s.refine.maxVoxels;
+    s.shape.layout = s.write.layout;
+    s.shape.layers = a.extendLayers.value_or(s.write.layout == VdbLayout::flat ? 1 : 0);
+    s.shape.halfFloat = a.half;
+    s.shape.boundsWorld = s.refine.boundsWorld;
+    s.shape.maxFlatVoxels = s.refine.maxVoxels;
     s.refine.bind = bindOptions(a.algorithm);
     s.write.algorithm = a.algorithm.name;
     s.write.sampleFormat = lossyFormat(s.refine.bind);

@@ -8,6 +8,7 @@
 
 #include "base/vec.h"
 #include "brick/refine.h"
+#include "io/shape_output.h"
 #include "io/vdb_file.h"
 
 namespace tessera {
@@ -72,6 +73,7 @@ struct ResampleArguments {
 struct ResampleSettings {
     RefineOptions refine;
     VdbWriteOptions write;
+    OutputShape shape;
     std::vector<FieldChoice> fields;       ///< empty: all
     std::vector<std::string> errorFields;  ///< empty: all chosen point fields
 };

@@ -168,10 +168,10 @@ Json statisticsJson(const ResampleStatistics& s) {
     return json;
 }
 
-Json writeResultJson(const VdbWriteResult& w) {
+Json writeResultJson(const VdbWriteResult& w, int flatLevel) {
     return {{"active_voxels", w.activeVoxels},
             {"file_bytes", w.fileBytes},
-            {"flat_level", w.flatLevel},
+            {"flat_level", flatLevel},
             {"unit_scale", w.unitScale},
             {"notes", w.notes}};
 }

@@ -46,7 +46,7 @@ Json coverageJson(const ErrorReport& report);
 Json errorJson(const ErrorReport& report);
 Json stagesJson(const StageTimes& times);
 Json statisticsJson(const ResampleStatistics& statistics);
-Json writeResultJson(const VdbWriteResult& written);
+Json writeResultJson(const VdbWriteResult& written, int flatLevel);
 /// What the steps of a time series share.
 Json seriesJson(std::size_t steps, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
 Json estimateJson(const PlanEstimate& estimate, double levelsMs, double flatMs);

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "base/error.h"
+#include "brick/kept_points.h"
 
 namespace tessera {
 
@@ -14,17 +15,13 @@ namespace {
 constexpr std::int64_t kElementChunk = 16384;
 constexpr double kDenseLimit = double(1 << 25);  // bricks of a dense grid of marks
 
-// Keeps every brick whose samples a place inside the bounds can need: cell corners reach one voxel out, and
-// those of the coarse cells that a border is interpolated from twice that.
+// Keeps every brick with points that reading inside the bounds can need.
 bool insideBounds(const BrickKey& key, const PlanFrame& frame) {
     if (!frame.boundsWorld) return true;
-    const double h = frame.spacingWorld(key.level);
-    const Vec3d low = (frame.boundsWorld->min - frame.originWorld) / h - 2.0;
-    const Vec3d high = (frame.boundsWorld->max - frame.originWorld) / h + 2.0;
-    const Vec3d first = Vec3d(key.index) * double(frame.brickCells);
-    const Vec3d last = first + double(frame.brickCells);
-    return first.x <= high.x && first.y <= high.y && first.z <= high.z && last.x >= low.x &&
-           last.y >= low.y && last.z >= low.z;
+    const IndexBox kept =
+        KeptPoints(frame.boundsWorld, frame.originWorld, frame.spacingWorld(key.level), 2).range(0);
+    const Vec3i first = key.index * frame.brickCells;
+    return !intersect(kept, {first, first + frame.brickCells}).empty();
 }
 
 // Bricks [min, max] whose touch boxes may meet a box in index space.

@@ -57,10 +57,6 @@ std::size_t tileOf(const Vec3i& local, int tilesPerEdge) {
            std::size_t(local.z >> 3);
 }
 
-int offsetOf(const Vec3i& local) {
-    return ((local.x & 7) * 8 + (local.y & 7)) * 8 + (local.z & 7);
-}
-
 }  // namespace
 
 BrickStore::BrickStore(int brickCells, std::size_t leafCount, int channels)
@@ -121,7 +117,7 @@ void BrickStore::moveLeaf(std::size_t leaf, BrickStore& from, std::size_t fromLe
 
 float BrickStore::value(std::size_t leaf, const Vec3i& local, int channel, bool& covered) const {
     const Tile* tile = tiles_[leaf * std::size_t(tileCount_) + tileOf(local, tilesPerEdge_)].get();
-    const int offset = offsetOf(local);
+    const int offset = offsetInTile(local);
     covered = tile && tile->covered(offset);
     return covered ? tile->channel(channel)[offset] : 0.0f;
 }
@@ -135,7 +131,7 @@ std::int64_t BrickStore::coveredPoints() const {
 }
 
 std::int64_t BrickStore::memoryBytes() const {
-    std::int64_t tiles = 0;
+    std::int64_t tiles = std::int64_t(extension_.size());
     for (const auto& tile : tiles_) tiles += tile ? 1 : 0;
     return tiles * std::int64_t(sizeof(Tile) + std::size_t(channels_) * kTilePoints * sizeof(float)) +
            std::int64_t(tiles_.size() * sizeof(tiles_[0]));

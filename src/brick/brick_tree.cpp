@@ -158,6 +158,40 @@ bool BrickTree::isRefined(const BrickKey& key) const {
     return descend(key, level) < kAbsent;
 }
 
+void BrickTree::findIn(std::int32_t entry, int level, const Vec3i& index, const Box3d& index0,
+                       std::vector<std::size_t>& leaves) const {
+    if (entry == kAbsent) return;
+    const double size = std::ldexp(double(brickCells_), level);
+    const Vec3d low = Vec3d(index) * size;
+    for (int a = 0; a < 3; ++a)
+        if (index0.max[a] < low[a] || index0.min[a] >= low[a] + size) return;
+    if (entry >= 0) {
+        leaves.push_back(std::size_t(entry));
+        return;
+    }
+    const Children& children = inner_[innerPosition(entry)];
+    for (int c = 0; c < 8; ++c)
+        findIn(children[std::size_t(c)], level - 1, index * 2 + Vec3i(c & 1, (c >> 1) & 1, c >> 2), index0,
+               leaves);
+}
+
+void BrickTree::findLeavesIn(const Box3d& index0, std::vector<std::size_t>& leaves) const {
+    if (levelCount_ == 0 || index0.empty()) return;
+    const int level = levelCount_ - 1;
+    if (denseRoots_.empty()) {
+        for (const auto& [key, entry] : sparseRoots_) findIn(entry, level, key.index, index0, leaves);
+        return;
+    }
+    const double size = std::ldexp(double(brickCells_), level);
+    const Vec3d first(rootMin_), last(rootMin_ + rootSize_ - 1);
+    const Vec3i low(glm::clamp(glm::floor(index0.min / size), first, last));
+    const Vec3i high(glm::clamp(glm::floor(index0.max / size), first, last));
+    for (int z = low.z; z <= high.z; ++z)
+        for (int y = low.y; y <= high.y; ++y)
+            for (int x = low.x; x <= high.x; ++x)
+                findIn(rootEntry({x, y, z}), level, {x, y, z}, index0, leaves);
+}
+
 std::int64_t BrickTree::findLeafAt(const Vec3d& index0) const {
     constexpr double kLimit = 2147483647.0;
     if (!(std::abs(index0.x) < kLimit && std::abs(index0.y) < kLimit && std::abs(index0.z) < kLimit))

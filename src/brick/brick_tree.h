@@ -60,6 +60,8 @@ class BrickTree {
     bool isRefined(const BrickKey& key) const;
     /// The leaf whose half-open box of cells contains the place, given in index space of level 0, or -1.
     std::int64_t findLeafAt(const Vec3d& index0) const;
+    /// Appends the leaves whose half-open boxes of cells meet a closed box given in index space of level 0.
+    void findLeavesIn(const Box3d& index0, std::vector<std::size_t>& leaves) const;
     /// The leaf, of any level, whose half-open box contains lattice point `p` of `level`, or -1.
     std::int64_t findLeafAt(int level, const Vec3i& p) const;
 
@@ -71,6 +73,8 @@ class BrickTree {
     static constexpr std::int32_t innerEntry(std::size_t position) { return -2 - std::int32_t(position); }
     static constexpr std::size_t innerPosition(std::int32_t entry) { return std::size_t(-2 - entry); }
 
+    void findIn(std::int32_t entry, int level, const Vec3i& index, const Box3d& index0,
+                std::vector<std::size_t>& leaves) const;
     void layOutRoots();
     void insert(std::int32_t leaf);
     std::int32_t rootEntry(const Vec3i& index) const;

@@ -39,6 +39,7 @@ struct ErrorReport {
     std::int64_t centroids = 0;    ///< samples at centroids
     std::int64_t outsideBricks =
         0;  ///< samples in no brick (only when --bounds cuts the mesh); not part of any figure
+    std::int64_t incomplete = 0;  ///< samples beside points that aren't stored, where no figure is measured
     std::int64_t coveredPoints = 0;
     std::int64_t flatElements = 0;  ///< zero volume
     std::int64_t invertedElements = 0;

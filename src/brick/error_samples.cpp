@@ -130,7 +130,7 @@ void LeafSampler::enter(std::size_t leaf) {
     for (const std::int32_t slot : touched_) slotOf_[std::size_t(slot)] = -1;
     touched_.clear();
     slotValues_.clear();
-    slotCovered_.clear();
+    slotSource_.clear();
     coarserNear_ = hasCoarserNeighbour(*tree_, leaf);
 }
 
@@ -147,10 +147,10 @@ bool LeafSampler::readCorners(const Vec3i& cell, Corners& corners) const {
     return true;
 }
 
-bool LeafSampler::reconstructSlowly(const CellPlace& place) {
+PointSource LeafSampler::reconstructSlowly(const CellPlace& place) {
     const std::size_t channels = values_.size();
     const int edge = tree_->brickCells() + 1;
-    bool covered = true;
+    PointSource source = PointSource::covered;
     std::fill(values_.begin(), values_.end(), 0.0);
     for (int c = 0; c < 8; ++c) {
         const double weight = cornerWeight(place.fraction, c);
@@ -158,17 +158,17 @@ bool LeafSampler::reconstructSlowly(const CellPlace& place) {
         const Vec3i p = place.cell + cornerOffset(c);
         std::int32_t& slot = slotOf_[std::size_t((p.z * edge + p.y) * edge + p.x)];
         if (slot < 0) {
-            slot = std::int32_t(slotCovered_.size());
+            slot = std::int32_t(slotSource_.size());
             touched_.push_back((p.z * edge + p.y) * edge + p.x);
             slotValues_.resize(slotValues_.size() + channels);
-            slotCovered_.push_back(reconstruction_->resolve(tree_->leaves()[leaf_].level, firstPoint_ + p, 0,
-                                                            std::span(slotValues_).last(channels)));
+            slotSource_.push_back(reconstruction_->resolve(tree_->leaves()[leaf_].level, firstPoint_ + p, 0,
+                                                           std::span(slotValues_).last(channels)));
         }
-        covered &= slotCovered_[std::size_t(slot)] != 0;
+        source = std::min(source, slotSource_[std::size_t(slot)]);
         const double* corner = slotValues_.data() + std::size_t(slot) * channels;
         for (std::size_t v = 0; v < channels; ++v) values_[v] += weight * corner[v];
     }
-    return covered;
+    return source;
 }
 
 bool LeafSampler::fieldErrors(std::size_t sample, std::span<double> errors) const {
@@ -196,7 +196,7 @@ bool LeafSampler::fieldErrors(std::size_t sample, std::span<double> errors) cons
     return allFinite;
 }
 
-bool LeafSampler::measure(std::size_t sample, std::span<double> errors) {
+PointSource LeafSampler::measure(std::size_t sample, std::span<double> errors) {
     const int b = tree_->brickCells();
     const Vec3d index = samples_->placeWorld(sample, tree_->originWorld()) * inverseSpacing_;
     const CellPlace place = locateInBrick(index - Vec3d(firstPoint_), b);
@@ -215,11 +215,11 @@ bool LeafSampler::measure(std::size_t sample, std::span<double> errors) {
         }
         // A value that isn't finite may have come from a corner of weight zero: the slow way leaves those
         // out.
-        if (fieldErrors(sample, errors)) return true;
+        if (fieldErrors(sample, errors)) return PointSource::covered;
     }
-    const bool covered = reconstructSlowly(place);
+    const PointSource source = reconstructSlowly(place);
     fieldErrors(sample, errors);
-    return covered;
+    return source;
 }
 
 }  // namespace tessera

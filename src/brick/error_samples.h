@@ -113,8 +113,8 @@ class LeafSampler {
                 const Reconstruction& reconstruction);
     void enter(std::size_t leaf);
     /// Writes |reconstructed - exact| of every field: NaN when either isn't finite, -1 for a cell field at a
-    /// node. Returns whether every corner that has a say is in the mesh.
-    bool measure(std::size_t sample, std::span<double> errors);
+    /// node. Returns the least source among the corners that have a say.
+    PointSource measure(std::size_t sample, std::span<double> errors);
 
   private:
     struct Corners {
@@ -122,7 +122,7 @@ class LeafSampler {
         int offset[8];
     };
     bool readCorners(const Vec3i& cell, Corners& corners) const;
-    bool reconstructSlowly(const CellPlace& place);
+    PointSource reconstructSlowly(const CellPlace& place);
     bool fieldErrors(std::size_t sample, std::span<double> errors) const;
 
     const SampledMesh* samples_;
@@ -138,7 +138,7 @@ class LeafSampler {
     std::vector<std::int32_t> slotOf_;
     std::vector<std::int32_t> touched_;
     std::vector<double> slotValues_;
-    std::vector<std::uint8_t> slotCovered_;
+    std::vector<PointSource> slotSource_;
 };
 
 }  // namespace tessera

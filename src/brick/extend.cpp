@@ -1,23 +1,254 @@
+#include "brick/extend.h"
+
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cmath>
+#include <glm/vector_relational.hpp>
+#include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <unordered_set>
 
 #include "base/error.h"
-#include "brick/seams.h"
+#include "brick/brick_plan.h"
+#include "brick/leaf_tiles.h"
+#include "brick/overlap.h"
 
 namespace tessera {
 
 namespace {
+
+constexpr std::int64_t kElementChunk = 4096;
+// A cell counts as touched within this many voxels: more than a place in it can be off by rounding.
+constexpr double kTouchSlack = 1.0 / 1024;
 
 bool ascending(const BrickKey& a, const BrickKey& b) {
     return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
            std::tie(b.level, b.index.z, b.index.y, b.index.x);
 }
 
-// Bricks that new points may lie in: the leaves, and what lies next to a leaf of the level and isn't a
-// coarser leaf's.
+/// The points of a leaf's closed box: which are covered, and which others touched cells need.
+class ClosedBox {
+  public:
+    ClosedBox(const BrickTree& tree, const BrickStore& store, const Reconstruction& reconstruction,
+              std::size_t leaf)
+        : edge_(tree.brickCells() + 1),
+          first_(tree.ownedPoints(tree.leaves()[leaf]).min),
+          covered_(words(), 0),
+          needed_(words(), 0) {
+        const int level = tree.leaves()[leaf].level;
+        const bool coarserNear = hasCoarserNeighbour(tree, leaf);
+        for (int x = 0; x < edge_; ++x)
+            for (int y = 0; y < edge_; ++y)
+                for (int z = 0; z < edge_; ++z) {
+                    const Vec3i local(x, y, z);
+                    const bool own = x + 1 < edge_ && y + 1 < edge_ && z + 1 < edge_;
+                    const bool onLowSide = x == 0 || y == 0 || z == 0;
+                    bool covered = false;
+                    if (own && !(onLowSide && coarserNear))
+                        store.value(leaf, local, 0, covered);
+                    else
+                        covered = reconstruction.isCovered(level, first_ + local);
+                    if (covered)
+                        set(covered_, at(local));
+                    else
+                        complete_ = false;
+                }
+    }
+    bool isComplete() const { return complete_; }
+
+    /// Marks what is missing at the corners of the cell. False when nothing new is.
+    bool needs(const Vec3i& cell) const {
+        for (int c = 0; c < 8; ++c) {
+            const std::size_t i = at(cell + cornerOffset(c));
+            if (!has(covered_, i) && !has(needed_, i)) return true;
+        }
+        return false;
+    }
+    void need(const Vec3i& cell) {
+        for (int c = 0; c < 8; ++c) {
+            const std::size_t i = at(cell + cornerOffset(c));
+            if (has(covered_, i)) continue;
+            std::atomic_ref<std::uint64_t>(needed_[i >> 6])
+                .fetch_or(std::uint64_t(1) << (i & 63), std::memory_order_relaxed);
+        }
+    }
+    template <class Visit>
+    void forEachNeeded(const Visit& visit) const {
+        for (int x = 0; x < edge_; ++x)
+            for (int y = 0; y < edge_; ++y)
+                for (int z = 0; z < edge_; ++z)
+                    if (has(needed_, at({x, y, z}))) visit(first_ + Vec3i(x, y, z));
+    }
+
+  private:
+    std::size_t words() const {
+        return (std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_) + 63) / 64;
+    }
+    std::size_t at(const Vec3i& p) const {
+        return (std::size_t(p.x) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) +
+               std::size_t(p.z);
+    }
+    static void set(std::vector<std::uint64_t>& bits, std::size_t i) {
+        bits[i >> 6] |= std::uint64_t(1) << (i & 63);
+    }
+    static bool has(const std::vector<std::uint64_t>& bits, std::size_t i) {
+        auto& word = const_cast<std::uint64_t&>(bits[i >> 6]);
+        return (std::atomic_ref<std::uint64_t>(word).load(std::memory_order_relaxed) >> (i & 63)) & 1;
+    }
+
+    int edge_;
+    Vec3i first_;
+    bool complete_ = true;
+    std::vector<std::uint64_t> covered_, needed_;
+};
+
+/// Face planes of an element: most cells beside it are told apart by these alone.
+struct FacePlanes {
+    std::array<Vec3d, 4> normal;
+    std::array<double, 4> offset;  // n . p <= offset inside
+    std::array<double, 4> reach;   // of a cell around its centre, along the normal
+
+    explicit FacePlanes(const std::array<Vec3d, 4>& p) {
+        for (std::size_t i = 0; i < 4; ++i) {
+            const Vec3d &a = p[(i + 1) & 3], &b = p[(i + 2) & 3], &c = p[(i + 3) & 3];
+            normal[i] = glm::cross(b - a, c - a);
+            if (glm::dot(normal[i], p[i] - a) > 0) normal[i] = -normal[i];
+            offset[i] = glm::dot(normal[i], a);
+            const Vec3d size = glm::abs(normal[i]);
+            // The tolerance covers the rounding of normals and products, for any shape.
+            const double scale =
+                (size.x + size.y + size.z) * (1 + glm::length(a)) + glm::length(b - a) * glm::length(c - a);
+            reach[i] = (0.5 + kTouchSlack) * (size.x + size.y + size.z) + 1e-12 * scale;
+        }
+    }
+    bool surelyOutside(const Vec3d& cellCentre) const {
+        for (std::size_t i = 0; i < 4; ++i)
+            if (glm::dot(normal[i], cellCentre) > offset[i] + reach[i]) return true;
+        return false;
+    }
+};
+
+/// Finds the extension's points.
+class Extender {
+  public:
+    Extender(const TetMesh& mesh, const BrickTree& tree, BrickStore& store,
+             const Reconstruction& reconstruction, const KeptPoints& kept, const Execution& execution)
+        : mesh_(mesh),
+          tree_(tree),
+          store_(store),
+          reconstruction_(reconstruction),
+          kept_(kept),
+          execution_(execution) {}
+
+    /// What cells that the mesh touches need.
+    void markNeeded() {
+        boxes_.resize(tree_.leafCount());
+        parallelFor(execution_, std::int64_t(boxes_.size()), [&](std::int64_t i) {
+            auto box = std::make_unique<ClosedBox>(tree_, store_, reconstruction_, std::size_t(i));
+            if (!box->isComplete()) boxes_[std::size_t(i)] = std::move(box);
+        });
+        parallelForChunks(execution_, mesh_.elementCount(), kElementChunk,
+                          [&](std::int64_t begin, std::int64_t end) {
+                              std::vector<std::size_t> leaves;
+                              for (std::int64_t e = begin; e < end; ++e) markElement(e, leaves);
+                          });
+        std::vector<std::vector<BrickKey>> found(boxes_.size());  // a level and a lattice point each
+        parallelFor(execution_, std::int64_t(boxes_.size()), [&](std::int64_t i) {
+            if (!boxes_[std::size_t(i)]) return;
+            const int level = tree_.leaves()[std::size_t(i)].level;
+            boxes_[std::size_t(i)]->forEachNeeded([&](const Vec3i& p) {
+                reconstruction_.visitOutside(level, p, [&](int ownerLevel, const Vec3i& point) {
+                    if (kept_.keeps(ownerLevel, point)) found[std::size_t(i)].push_back({ownerLevel, point});
+                });
+            });
+        });
+        boxes_.clear();
+        for (const auto& points : found)
+            for (const BrickKey& p : points) mark(p.level, p.index);
+    }
+
+    /// All points within some layers of the covered ones, or one less of those marked, of the same level.
+    void markLayers(int layers);
+
+    void fill(const ExtensionValues& values) {
+        std::vector<std::pair<TileKey, Tile*>> tiles;
+        for (auto& [key, tile] : store_.extension()) tiles.emplace_back(key, &tile);
+        const std::size_t channels = std::size_t(store_.channels());
+        parallelFor(execution_, std::int64_t(tiles.size()), [&](std::int64_t t) {
+            const auto& [key, tile] = tiles[std::size_t(t)];
+            tile->values = std::make_unique<float[]>(channels * kTilePoints);
+            std::vector<double> value(channels);
+            for (int offset = 0; offset < kTilePoints; ++offset) {
+                if (!tile->covered(offset)) continue;
+                values(key.level, key.index * kTileSize + pointInTile(offset), value);
+                for (std::size_t c = 0; c < channels; ++c)
+                    tile->values[c * kTilePoints + std::size_t(offset)] = float(value[c]);
+            }
+        });
+    }
+
+  private:
+    void mark(int level, const Vec3i& p) {
+        store_.extension()[{level, floorDiv(p, kTileSize)}].cover(offsetInTile(p));
+    }
+
+    void markElement(std::int64_t e, std::vector<std::size_t>& leaves) {
+        prefetchNodes(mesh_, std::min(e + kPrefetchElements, mesh_.elementCount() - 1));
+        const auto nodes0 = elementInIndexSpace(mesh_, e, tree_.originWorld(), tree_.spacingWorld(0));
+        Box3d bounds0;
+        for (const Vec3d& node : nodes0) bounds0.include(node);
+        // A cell of the coarsest level may be touched from outside its leaf by that level's slack.
+        const double slack0 = std::ldexp(kTouchSlack, tree_.levelCount());
+        leaves.clear();
+        tree_.findLeavesIn({bounds0.min - slack0, bounds0.max + slack0}, leaves);
+        int level = -1;
+        std::optional<ElementOverlap> element;
+        std::optional<FacePlanes> planes;
+        for (const std::size_t leaf : leaves) {
+            ClosedBox* box = boxes_[leaf].get();
+            if (!box) continue;
+            if (tree_.leaves()[leaf].level != level) {
+                level = tree_.leaves()[leaf].level;
+                std::array<Vec3d, 4> nodes = nodes0;
+                for (Vec3d& node : nodes) node *= std::ldexp(1.0, -level);
+                element.emplace(nodes);
+                planes.emplace(nodes);
+            }
+            markCells(*element, *planes, tree_.ownedPoints(tree_.leaves()[leaf]), *box);
+        }
+    }
+
+    static void markCells(const ElementOverlap& element, const FacePlanes& planes, const IndexBox& cells,
+                          ClosedBox& box) {
+        const Vec3d first(cells.min), last(cells.max - 1);
+        const Vec3d lowest = glm::floor(element.bounds().min - kTouchSlack),
+                    highest = glm::floor(element.bounds().max + kTouchSlack);
+        if (glm::any(glm::greaterThan(lowest, last)) || glm::any(glm::lessThan(highest, first))) return;
+        const Vec3i low(glm::max(lowest, first)), high(glm::min(highest, last));
+        for (int x = low.x; x <= high.x; ++x)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int z = low.z; z <= high.z; ++z) {
+                    const Vec3i cell = Vec3i(x, y, z);
+                    if (!box.needs(cell - cells.min) || planes.surelyOutside(Vec3d(cell) + 0.5)) continue;
+                    if (element.touches({Vec3d(cell) - kTouchSlack, Vec3d(cell) + (1 + kTouchSlack)}))
+                        box.need(cell - cells.min);
+                }
+    }
+
+    const TetMesh& mesh_;
+    const BrickTree& tree_;
+    BrickStore& store_;
+    const Reconstruction& reconstruction_;
+    const KeptPoints& kept_;
+    const Execution& execution_;
+    std::vector<std::unique_ptr<ClosedBox>> boxes_;  // one a leaf; null where every point is covered
+};
+
+// Bricks that layers may lie in: the leaves, and what lies next to a leaf of the level and isn't a coarser
+// leaf's.
 std::vector<BrickKey> targetBricks(const BrickTree& tree) {
     std::unordered_set<BrickKey, BrickKeyHash> keys;
     for (const BrickKey& leaf : tree.leaves())
@@ -32,24 +263,45 @@ std::vector<BrickKey> targetBricks(const BrickTree& tree) {
     return sorted;
 }
 
-// Coverage of one brick and a border around it, one byte a point, x fastest.
-class CoverageWindow {
+// Marks of one brick and a border around it, one byte a point, x fastest.
+class LayerWindow {
   public:
-    CoverageWindow(const BrickTree& tree, const BrickStore& store, const BrickKey& key, int layers)
+    LayerWindow(const BrickTree& tree, const BrickStore& store, const BrickKey& key, int layers)
         : layers_(layers),
-          edge_(tree.brickCells() + 2 * layers),
+          brickCells_(tree.brickCells()),
+          edge_(brickCells_ + 2 * layers),
           marks_(std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_), 0) {
-        for (int n = 0; n < 27; ++n) {
-            const Vec3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        const int n = store.tilesPerEdge();
+        for (int near = 0; near < 27; ++near) {
+            const Vec3i step(near % 3 - 1, near / 3 % 3 - 1, near / 9 - 1);
             const std::int64_t leaf = tree.findLeaf({key.level, key.index + step});
-            if (leaf >= 0) copy(store, std::size_t(leaf), step * tree.brickCells(), tree.brickCells());
+            if (leaf < 0) continue;
+            for (int t = 0; t < store.tileCount(); ++t)
+                if (const Tile* tile = store.tile(std::size_t(leaf), t))
+                    include(*tile, step * brickCells_ + Vec3i(t / (n * n), t / n % n, t % n) * kTileSize);
         }
+        covered_ = marks_;
     }
     bool empty() const { return !any_; }
-    bool covered(const Vec3i& local) const { return marks_[at(local + layers_)] != 0; }
-    /// Marks every point within `layers` steps (26 neighbours) of a marked one: three passes, one an axis.
-    void grow() {
-        for (int axis = 0; axis < 3; ++axis) {
+    bool isNew(const Vec3i& local) const {
+        const std::size_t i = at(local + layers_);
+        return marks_[i] != 0 && covered_[i] == 0;
+    }
+    /// @param first the tile's first point, counted from the brick's.
+    void include(const Tile& tile, const Vec3i& first) {
+        const Vec3i low = glm::max(Vec3i(0), -layers_ - first);
+        const Vec3i high = glm::min(Vec3i(kTileSize), brickCells_ + layers_ - first);
+        for (int x = low.x; x < high.x; ++x)
+            for (int y = low.y; y < high.y; ++y)
+                for (int z = low.z; z < high.z; ++z) {
+                    if (!tile.covered((x * 8 + y) * 8 + z)) continue;
+                    marks_[at(first + Vec3i(x, y, z) + layers_)] = 1;
+                    any_ = true;
+                }
+    }
+    /// Marks every point within `steps` (26 neighbours) of a marked one: three passes, one an axis.
+    void grow(int steps) {
+        for (int axis = 0; axis < 3 && steps > 0; ++axis) {
             const std::vector<std::uint8_t> before = marks_;
             Vec3i step(0);
             step[axis] = 1;
@@ -58,7 +310,7 @@ class CoverageWindow {
                     for (int x = 0; x < edge_; ++x) {
                         const Vec3i p(x, y, z);
                         if (!before[at(p)]) continue;
-                        for (int d = -layers_; d <= layers_; ++d)
+                        for (int d = -steps; d <= steps; ++d)
                             if (p[axis] + d >= 0 && p[axis] + d < edge_) marks_[at(p + step * d)] = 1;
                     }
         }
@@ -69,24 +321,10 @@ class CoverageWindow {
         return (std::size_t(p.z) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) +
                std::size_t(p.x);
     }
-    void copy(const BrickStore& store, std::size_t leaf, const Vec3i& offset, int brickCells) {
-        const Vec3i low = glm::max(Vec3i(0), -offset - layers_);
-        const Vec3i high = glm::min(Vec3i(brickCells), brickCells + layers_ - offset);
-        const int n = store.tilesPerEdge();
-        for (int z = low.z; z < high.z; ++z)
-            for (int y = low.y; y < high.y; ++y)
-                for (int x = low.x; x < high.x; ++x) {
-                    const Tile* tile = store.tile(leaf, ((x >> 3) * n + (y >> 3)) * n + (z >> 3));
-                    if (!tile || !tile->covered(((x & 7) * 8 + (y & 7)) * 8 + (z & 7))) continue;
-                    marks_[at(Vec3i(x, y, z) + offset + layers_)] = 1;
-                    any_ = true;
-                }
-    }
 
-    int layers_;
-    int edge_;
-    std::vector<std::uint8_t> marks_;
+    int layers_, brickCells_, edge_;
     bool any_ = false;
+    std::vector<std::uint8_t> marks_, covered_;
 };
 
 bool fullyCovered(const BrickStore& store, std::size_t leaf) {
@@ -99,75 +337,57 @@ bool fullyCovered(const BrickStore& store, std::size_t leaf) {
     return true;
 }
 
-// New points of one brick, in order.
-std::vector<Vec3i> newPoints(const BrickTree& tree, const BrickStore& store, const BrickKey& key,
-                             int layers) {
-    std::vector<Vec3i> points;
-    const std::int64_t leaf = tree.findLeaf(key);
-    if (leaf >= 0 && fullyCovered(store, std::size_t(leaf))) return points;
-    CoverageWindow window(tree, store, key, layers);
-    if (window.empty()) return points;
-    CoverageWindow grown = window;
-    grown.grow();
-    const bool shared = tree.isRefined(key);
-    const int b = tree.brickCells();
-    for (int z = 0; z < b; ++z)
-        for (int y = 0; y < b; ++y)
-            for (int x = 0; x < b; ++x) {
-                const Vec3i local(x, y, z);
-                if (!grown.covered(local) || window.covered(local)) continue;
-                const Vec3i p = key.index * b + local;
-                if (shared && tree.findLeafAt(key.level, p) >= 0) continue;  // a finer leaf's own
-                points.push_back(p);
-            }
-    return points;
+void Extender::markLayers(int layers) {
+    const std::vector<BrickKey> targets = targetBricks(tree_);
+    std::vector<std::vector<Vec3i>> points(targets.size());
+    const int b = tree_.brickCells();
+    parallelFor(execution_, std::int64_t(targets.size()), [&](std::int64_t t) {
+        const BrickKey& key = targets[std::size_t(t)];
+        const std::int64_t leaf = tree_.findLeaf(key);
+        if (leaf >= 0 && fullyCovered(store_, std::size_t(leaf))) return;
+        LayerWindow window(tree_, store_, key, layers);
+        window.grow(1);
+        const Vec3i first = key.index * b;
+        const Vec3i low = floorDiv(first - layers, kTileSize),
+                    high = floorDiv(first + (b - 1) + layers, kTileSize);
+        for (int x = low.x; x <= high.x; ++x)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int z = low.z; z <= high.z; ++z) {
+                    const auto found = store_.extension().find({key.level, {x, y, z}});
+                    if (found != store_.extension().end())
+                        window.include(found->second, Vec3i(x, y, z) * kTileSize - first);
+                }
+        if (window.empty()) return;
+        window.grow(layers - 1);
+        const bool shared = tree_.isRefined(key);
+        for (int z = 0; z < b; ++z)
+            for (int y = 0; y < b; ++y)
+                for (int x = 0; x < b; ++x) {
+                    const Vec3i local(x, y, z);
+                    if (!window.isNew(local) || !kept_.keeps(key.level, first + local)) continue;
+                    if (shared && tree_.findLeafAt(key.level, first + local) >= 0)
+                        continue;  // a finer leaf's own
+                    points[std::size_t(t)].push_back(first + local);
+                }
+    });
+    for (std::size_t t = 0; t < targets.size(); ++t)
+        for (const Vec3i& p : points[t]) mark(targets[t].level, p);
 }
 
 }  // namespace
 
-ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                              const BrickStore& store, const NearestPointIndex& nearest, int layers,
-                              const Execution& execution) {
+void extendOutside(const TetMesh& mesh, const BrickTree& tree, BrickStore& store,
+                   const Reconstruction& reconstruction, const KeptPoints& kept, int layers,
+                   const ExtensionValues& values, const Execution& execution) {
     if (layers < 0 || layers > tree.brickCells())
         throw InputError("the number of layers outside the mesh must be 0 to the brick size, not " +
                          std::to_string(layers));
-    ExtensionPoints result;
-    if (layers == 0) return result;
-    const std::vector<BrickKey> targets = targetBricks(tree);
-    std::vector<std::vector<Vec3i>> points(targets.size());
-    parallelFor(execution, std::int64_t(targets.size()), [&](std::int64_t t) {
-        points[std::size_t(t)] = newPoints(tree, store, targets[std::size_t(t)], layers);
-    });
-    for (std::size_t t = 0; t < targets.size(); ++t)
-        for (const Vec3i& p : points[t]) result.points.push_back({p, targets[t].level, 0});
-    std::sort(result.points.begin(), result.points.end(),
-              [](const ExtensionPoint& a, const ExtensionPoint& b) {
-                  return ascending({a.level, a.index}, {b.level, b.index});
-              });
-
-    const std::size_t channels = std::size_t(store.channels());
-    TESSERA_CHECK(result.points.size() * channels < (std::size_t(1) << 32),
-                  "extension values are counted in 32 bits");
-    result.values.resize(result.points.size() * channels);
-    parallelForChunks(
-        execution, std::int64_t(result.points.size()), 256, [&](std::int64_t begin, std::int64_t end) {
-            for (std::int64_t i = begin; i < end; ++i) {
-                ExtensionPoint& point = result.points[std::size_t(i)];
-                const double h = tree.spacingWorld(point.level);
-                const Vec3d place = tree.lattice(point.level).worldFromIndex(Vec3d(point.index));
-                // Within `layers` steps along every axis of a covered point: a diagonal at most, and room for
-                // rounding.
-                const NearestPoint found = nearest.find(place, 2.0 * (layers + 1) * h);
-                std::size_t at = std::size_t(i) * channels;
-                point.firstValue = std::uint32_t(at);
-                for (const int f : fields) {
-                    const Field& field = mesh.fields[std::size_t(f)];
-                    for (int c = 0; c < field.components; ++c)
-                        result.values[at++] = found.element < 0 ? 0.0f : float(found.value(field, c));
-                }
-            }
-        });
-    return result;
+    store.extension().clear();
+    if (layers == 0) return;
+    Extender extender(mesh, tree, store, reconstruction, kept, execution);
+    extender.markNeeded();
+    extender.markLayers(layers);
+    extender.fill(values);
 }
 
 }  // namespace tessera

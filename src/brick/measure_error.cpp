@@ -175,15 +175,19 @@ void countSamples(const SampleErrors& errors, ErrorReport& report) {
     report.nodes = errors.nodes;
     report.centroids = errors.centroids;
     report.outsideBricks = errors.outside;
+    report.incomplete = errors.incomplete;
     report.flatElements = errors.flatElements;
     report.invertedElements = errors.invertedElements;
     const std::int64_t all = errors.nodes + errors.centroids;
     report.fullyCoveredShare = all > 0 ? double(errors.fullyCovered) / double(all) : 0;
 }
 
-ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                        const BrickStore& store, const Reconstruction& reconstruction,
-                        const Execution& execution, const MeasureOptions& options) {
+}  // namespace
+
+ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
+                         const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
+                         const MeasureOptions& options) {
+    const Reconstruction reconstruction(mesh, fields, tree, store, nearest, options.outside);
     std::optional<SampledMesh> own;
     if (!options.samples) own.emplace(mesh, fields, execution);
     const SampledMesh& samples = options.samples ? *options.samples : *own;
@@ -207,22 +211,6 @@ ErrorReport measureWith(const TetMesh& mesh, std::span<const int> fields, const 
     }
     execution.report("verify", 3, 3);
     return report;
-}
-
-}  // namespace
-
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                         const BrickStore& store, const NearestPointIndex& nearest,
-                         const Execution& execution, const MeasureOptions& options) {
-    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest),
-                       execution, options);
-}
-
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                         const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
-                         const MeasureOptions& options) {
-    return measureWith(mesh, fields, tree, store, Reconstruction(mesh, fields, tree, store, nearest),
-                       execution, options);
 }
 
 }  // namespace tessera

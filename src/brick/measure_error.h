@@ -9,7 +9,6 @@
 #include "brick/brick_tree.h"
 #include "brick/error_report.h"
 #include "brick/seams.h"
-#include "mesh/nearest_point.h"
 #include "mesh/tet_mesh.h"
 
 namespace tessera {
@@ -19,6 +18,8 @@ class SampledMesh;
 struct MeasureOptions {
     /// Samples outside this box are counted, not measured: the box that the tree was made for.
     std::optional<Box3d> boundsWorld;
+    /// What a corner outside the mesh takes that the store's extension has no value for.
+    Outside outside = Outside::nearest;
     /// When not null: the same mesh and fields, described for an earlier measurement.
     const SampledMesh* samples = nullptr;
     /// When not null: receives the largest relative error of any field in each leaf (drives refinement),
@@ -27,14 +28,11 @@ struct MeasureOptions {
 };
 
 /// Measures trilinear reconstruction against the exact field. A lattice corner outside the mesh takes the
-/// value at the nearest mesh point; across a change of level the border is interpolated from the coarse brick
-/// (docs/algorithms.md, Seams). The volume-weighted RMS takes each element by the quadrature that is exact
-/// for quadratics: a node weighs |volume| / 20, the centroid 4 |volume| / 5 (cell fields: the centroid
-/// |volume|). The same for any number of threads.
+/// extension's value, or that at the nearest mesh point; across a change of level the border is interpolated
+/// from the coarse brick (docs/algorithms.md, Seams). The volume-weighted RMS takes each element by the
+/// quadrature that is exact for quadratics: a node weighs |volume| / 20, the centroid 4 |volume| / 5 (cell
+/// fields: the centroid |volume|). The same for any number of threads.
 /// @param fields indices into mesh.fields whose components are the store's channels, in this order.
-ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                         const BrickStore& store, const NearestPointIndex& nearest,
-                         const Execution& execution, const MeasureOptions& options = {});
 ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
                          const BrickStore& store, const NearestOnDemand& nearest, const Execution& execution,
                          const MeasureOptions& options = {});

@@ -24,11 +24,16 @@ std::string shortNumber(double value) {
 
 // An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and
 // so an ordinary size; flat boundary-layer elements come out between their thickness and their length.
-std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Execution& execution) {
+// Elements outside the bounds have none.
+std::vector<float> elementSizes(const TetMesh& mesh, double unit, const std::optional<Box3d>& boundsWorld,
+                                const Execution& execution) {
     std::vector<float> sizes(mesh.tets.size());
     parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t e = begin; e < end; ++e) {
             prefetchNodes(mesh, std::min(e + kPrefetchElements, mesh.elementCount() - 1));
+            if (boundsWorld &&
+                !ElementOverlap(elementInIndexSpace(mesh, e, Vec3d(0), 1)).touches(*boundsWorld))
+                continue;
             const auto nodes = elementInIndexSpace(mesh, e, Vec3d(0), unit);
             double product = 1;
             for (std::size_t a = 0; a < 4; ++a)
@@ -40,6 +45,19 @@ std::vector<float> elementSizes(const TetMesh& mesh, double unit, const Executio
         }
     });
     return sizes;
+}
+
+// A box inside a mesh may hold few elements: the coarsest spacing is what the largest of them asks for, up to
+// two points along the box.
+void coarsenRoot(PlanFrame& frame, std::vector<float>& sizes, double samplesPerElement) {
+    const double wanted = double(*std::max_element(sizes.begin(), sizes.end())) / samplesPerElement;
+    const Vec3d box = frame.boundsWorld->size();
+    const double most = std::max({box.x, box.y, box.z}) / frame.rootSpacingWorld;
+    int up = 0;
+    while (std::ldexp(1.0, up + 1) <= std::min(wanted, most)) ++up;
+    frame.rootSpacingWorld = std::ldexp(frame.rootSpacingWorld, up);
+    frame.maxDepth += up;
+    for (float& size : sizes) size = std::ldexp(size, -up);
 }
 
 // Whether the size that a brick's spacing follows, the kSizeQuantile quantile of its elements' sizes, is too
@@ -132,12 +150,14 @@ BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOpt
 BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
                             std::size_t maxLeaves, const Execution& execution,
                             std::vector<std::string>* notes) {
-    const PlanFrame frame = chooseFrame(meshBox, options);
+    PlanFrame frame = chooseFrame(meshBox, options);
     const bool isDefault =
         options.maxVoxels == 0 && options.maxMemoryBytes == 0 && !hasFinestSpacing(options);
     const std::size_t brickPoints = std::size_t(std::pow(options.brickCells, 3));
     if (isDefault) maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
-    const std::vector<float> sizes = elementSizes(mesh, frame.rootSpacingWorld, execution);
+    std::vector<float> sizes = elementSizes(mesh, frame.rootSpacingWorld, options.boundsWorld, execution);
+    if (options.boundsWorld && !hasFinestSpacing(options) && options.maxLevels == 0)
+        coarsenRoot(frame, sizes, options.samplesPerElement);
     BrickPlan plan(mesh, frame, execution);
     if (plan.leafCount() > maxLeaves)
         throw InputError("the coarsest plan has " + std::to_string(plan.leafCount() * brickPoints) +

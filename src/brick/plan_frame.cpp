@@ -132,6 +132,9 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
         return frame;
     }
     frame.rootSpacingWorld = longest / rootCells;
+    // A box to look at closely needn't hold many elements: refinement by error starts from few points there.
+    if (options.boundsWorld && options.criterion == Criterion::error && options.maxLevels == 0)
+        while (frame.rootSpacingWorld * options.brickCells < longest) frame.rootSpacingWorld *= 2;
     const double far = std::max(1.0, farthestIndex(sampled, frame.originWorld, frame.rootSpacingWorld));
     while (frame.maxDepth + 1 < levels && std::ldexp(far, frame.maxDepth + 1) < kMaxIndex) ++frame.maxDepth;
     return frame;

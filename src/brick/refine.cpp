@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "brick/error_samples.h"
+#include "brick/kept_points.h"
 #include "brick/measure_error.h"
 #include "brick/plan_frame.h"
 #include "brick/resample_tree.h"
@@ -38,25 +39,34 @@ struct FieldBound {
     double bound = 0;
 };
 
+// Whether the bound holds for a field: those named, or all but the cell fields, whose largest error never
+// vanishes.
+bool isBounded(const TetMesh& mesh, int field, const RefineOptions& options) {
+    if (!options.errorFields.empty())
+        return std::find(options.errorFields.begin(), options.errorFields.end(), field) !=
+               options.errorFields.end();
+    return mesh.fields[std::size_t(field)].location != FieldLocation::cell ||
+           options.measure != ErrorMeasure::max;
+}
+
+double boundOf(const RefineOptions& options, double range) {
+    return options.maxErrorIsRelative ? options.maxError * range : options.maxError;
+}
+
 std::vector<FieldBound> errorBounds(const TetMesh& mesh, std::span<const int> fields,
                                     const ErrorSamples& samples, const RefineOptions& options) {
     std::vector<FieldBound> bounds;
     bool onlyCells = true;
     for (std::size_t f = 0; f < fields.size(); ++f) {
+        if (!isBounded(mesh, fields[f], options)) continue;
         const Field& field = mesh.fields[std::size_t(fields[f])];
-        const bool isCell = field.location == FieldLocation::cell;
-        const bool named = std::find(options.errorFields.begin(), options.errorFields.end(), fields[f]) !=
-                           options.errorFields.end();
-        if (!named && (!options.errorFields.empty() || (isCell && options.measure == ErrorMeasure::max)))
-            continue;
-        onlyCells = onlyCells && isCell;
+        onlyCells = onlyCells && field.location == FieldLocation::cell;
         bool anyFinite = false;
         for (int c = 0; c < field.components; ++c) anyFinite = anyFinite || !fieldRange(field, c).empty();
         if (!anyFinite)
             throw InputError("field " + field.name +
                              " has no finite value, so no error bound can hold for it");
-        const double range = samples.fields()[f].range;
-        const double bound = options.maxErrorIsRelative ? options.maxError * range : options.maxError;
+        const double bound = boundOf(options, samples.fields()[f].range);
         if (bound == 0) continue;  // a constant field has no relative error
         // Half a unit in the last place of the largest value; below 2^-126 floats are 2^-149 apart.
         const double roundOff = std::max(std::ldexp(samples.fields()[f].largest, -24), 0x1p-150);
@@ -87,6 +97,10 @@ std::string givenBound(const RefineOptions& options) {
     if (options.maxMemoryBytes > 0)
         return ", the given bound " + std::to_string(options.maxMemoryBytes) + " bytes";
     return {};
+}
+
+KeptPoints keptPoints(const BrickTree& tree, const RefineOptions& options) {
+    return {options.boundsWorld, tree.originWorld(), tree.spacingWorld(), tree.levelCount()};
 }
 
 class ErrorRefinement {
@@ -132,8 +146,7 @@ class ErrorRefinement {
     bool touchesFresh(std::size_t leaf) const;
     double leafRatio(std::size_t leaf, const PlannedBrick& brick, LeafSampler& sampler) const;
     ErrorReport report();
-    bool withinBound(const ErrorReport& report) const;
-    std::string whyStopped(const ErrorReport& report) const;
+    std::string whyStopped(const std::string& exceeded) const;
 
     const TetMesh& mesh_;
     std::span<const int> fields_;
@@ -312,32 +325,9 @@ bool ErrorRefinement::refine() {
     return done;
 }
 
-bool ErrorRefinement::withinBound(const ErrorReport& report) const {
-    return std::all_of(bounds_.begin(), bounds_.end(), [&](const FieldBound& b) {
-        const FieldError& error = report.fields[b.field];
-        return error.samples > 0 &&
-               (options_.measure == ErrorMeasure::rms ? error.rms : error.max) <= b.bound;
-    });
-}
-
-std::string ErrorRefinement::whyStopped(const ErrorReport& report) const {
-    const FieldBound* worst = nullptr;
-    double ratio = 0;
-    for (const FieldBound& b : bounds_) {
-        const FieldError& error = report.fields[b.field];
-        if (error.samples == 0)
-            return "no sample of field " + error.name +
-                   " has a finite value as a 32-bit float, so its error can't be measured";
-        const double r = (options_.measure == ErrorMeasure::rms ? error.rms : error.max) / b.bound;
-        if (r > ratio) ratio = r, worst = &b;
-    }
-    TESSERA_CHECK(worst, "an unmet bound has a field that exceeds it");
-    const FieldError& error = report.fields[worst->field];
-    const double reached = options_.measure == ErrorMeasure::rms ? error.rms : error.max;
+std::string ErrorRefinement::whyStopped(const std::string& exceeded) const {
     return (stopped_.empty() ? std::string("no brick left to split") : stopped_) +
-           " ended the refinement at " + (options_.measure == ErrorMeasure::rms ? "an RMS" : "a largest") +
-           " error of " + shortNumber(reached) + " in " + error.name + " (bound " +
-           shortNumber(worst->bound) + "); the worst spot is " + placeText(error.worstPlaceWorld);
+           " ended the refinement at " + exceeded;
 }
 
 ErrorReport ErrorRefinement::report() {
@@ -356,6 +346,7 @@ BrickResult ErrorRefinement::run() {
     takeSamples();
     times_.planMs += timer.elapsedMs();
     BrickResult result;
+    std::string exceeded;
     for (;;) {
         execution_.throwIfCancelled();
         sampleNewLeaves();
@@ -363,15 +354,20 @@ BrickResult ErrorRefinement::run() {
         ++rounds_;
         if (refine()) continue;
         result.report = report();
-        result.bounded = withinBound(result.report);
-        if (result.bounded || !stopped_.empty()) break;
+        exceeded = exceededBound(mesh_, fields_, options_, result.report);
+        if (exceeded.empty() || !stopped_.empty()) break;
         // A coarse corner's value can change through a chain of level borders, beyond the neighbours that
         // were measured again.
         std::fill(fresh_.begin(), fresh_.end(), std::uint8_t(1));
         measureChanged();
         if (!refine()) break;
     }
-    if (!result.bounded) result.stoppedBecause = whyStopped(result.report);
+    result.bounded = exceeded.empty();
+    if (!result.bounded) result.stoppedBecause = whyStopped(exceeded);
+    if (options_.boundsWorld) {
+        cropToKept(tree_, keptPoints(tree_, options_), store_);
+        result.report = report();
+    }
     result.tree = std::move(tree_);
     result.store = std::move(store_);
     result.statistics = statistics_;
@@ -382,6 +378,29 @@ BrickResult ErrorRefinement::run() {
 }
 
 }  // namespace
+
+std::string exceededBound(const TetMesh& mesh, std::span<const int> fields, const RefineOptions& options,
+                          const ErrorReport& report) {
+    const bool rms = options.measure == ErrorMeasure::rms;
+    std::string sentence;
+    double worst = 1;
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+        const FieldError& error = report.fields[f];
+        if (!isBounded(mesh, fields[f], options)) continue;
+        const double bound = boundOf(options, error.range);
+        if (bound == 0) continue;  // a constant field has no relative error
+        if (error.samples == 0)
+            return "no measured error: no sample of field " + error.name +
+                   " has a finite value as a 32-bit float";
+        const double reached = rms ? error.rms : error.max;
+        if (reached / bound <= worst) continue;
+        worst = reached / bound;
+        sentence = (rms ? "an RMS error of " : "a largest error of ") + shortNumber(reached) + " in " +
+                   error.name + " (bound " + shortNumber(bound) + "); the worst spot is " +
+                   placeText(error.worstPlaceWorld);
+    }
+    return sentence;
+}
 
 BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
                               const RefineOptions& options, const Execution& execution) {
@@ -402,6 +421,7 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
     const auto bound = resampler.bind(mesh, fields, options.bind);
     result.target = bound->target();
     result.store = resampleTree(result.tree, *bound, channels, execution, result.statistics);
+    cropToKept(result.tree, keptPoints(result.tree, options), result.store);
     result.times.resampleMs = timer.restart();
     const NearestOnDemand nearest(mesh, execution.threads);
     buildIfNeeded(nearest, result.store);

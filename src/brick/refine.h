@@ -41,7 +41,7 @@ struct RefineOptions {
     std::int64_t maxVoxels =
         0;  ///< bound on stored points (leaves x B^3); 0: a default from the memory there is
     std::int64_t maxMemoryBytes = 0;   ///< bound on the samples' memory; 0: no bound of its own
-    std::optional<Box3d> boundsWorld;  ///< sample only the bricks that this box needs (whole bricks)
+    std::optional<Box3d> boundsWorld;  ///< keep only the points that reading inside this box needs
     std::optional<FixedFrame> frame;   ///< instead of resolution and spacing; level 0 is then its spacing,
                                        ///< even when no brick is so fine
     BindOptions bind;                  ///< what the resampler runs with
@@ -75,6 +75,11 @@ struct BrickTimes {
 
 /// A tree with its samples and its measured error.
 struct BrickResult {
+    /// What a flat grid was made of (flatten); `tree` and `store` are then the grid's own.
+    std::optional<BrickTree> bricks;
+    int flatLevel = 0;  ///< of these bricks: the grid's spacing
+    /// What the samples' error was before half floats or a coarser grid made another of it.
+    std::optional<ErrorReport> samplesReport;
     BrickTree tree;
     BrickStore store;
     ErrorReport report;
@@ -86,6 +91,12 @@ struct BrickResult {
     int rounds = 0;                  ///< error: rounds of refinement
     std::vector<std::string> notes;  ///< sentences for the user
 };
+
+/// A bound of refinement by error that a report exceeds, as a sentence: which field, by how much, where.
+/// Empty when the report keeps to it.
+/// @param fields what the report's fields are in the mesh.
+std::string exceededBound(const TetMesh& mesh, std::span<const int> fields, const RefineOptions& options,
+                          const ErrorReport& report);
 
 /// Samples every leaf of a tree. Neighbouring leaves of one level are sampled in larger blocks than a brick.
 BrickStore resampleTree(const BrickTree& tree, BoundResampler& resampler, int channels,

@@ -29,7 +29,7 @@ struct Deferred {
 struct Part {
     std::vector<FieldSums> sums;
     std::vector<Deferred> deferred;
-    std::int64_t inside = 0, outside = 0, fullyCovered = 0, flat = 0, inverted = 0;
+    std::int64_t inside = 0, outside = 0, fullyCovered = 0, incomplete = 0, flat = 0, inverted = 0;
 };
 
 // Some samples on their way. The corners' addresses are found for all of them before the first value is read,
@@ -353,7 +353,9 @@ void Measurement::measureDeferred(std::vector<Part>& parts) {
         for (std::int64_t run = begin; run < end; ++run) {
             sampler.enter(std::size_t(all[runs[std::size_t(run)]].leaf));
             for (std::size_t i = runs[std::size_t(run)]; i < runs[std::size_t(run) + 1]; ++i) {
-                part.fullyCovered += sampler.measure(all[i].sample, errors);
+                const PointSource source = sampler.measure(all[i].sample, errors);
+                part.fullyCovered += source == PointSource::covered;
+                part.incomplete += source == PointSource::missing;
                 keep(all[i].sample, all[i].leaf, errors, part);
                 if (all[i].sample < samples_.nodeCount()) continue;
                 for (std::size_t f = 0; f < lists_.size(); ++f)
@@ -368,6 +370,7 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
     for (const Part& part : parts) {
         result.outside += part.outside;
         result.fullyCovered += part.fullyCovered;
+        result.incomplete += part.incomplete;
         result.flatElements += part.flat;
         result.invertedElements += part.inverted;
         for (std::size_t f = 0; f < result.sums.size(); ++f) {

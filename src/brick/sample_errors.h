@@ -34,7 +34,7 @@ struct SampleErrors {
     /// where skipped, -1 where there is no sample.
     std::vector<std::vector<float>> lists;
     std::vector<FieldSums> sums;  ///< one a field
-    std::int64_t nodes = 0, centroids = 0, outside = 0, fullyCovered = 0;
+    std::int64_t nodes = 0, centroids = 0, outside = 0, fullyCovered = 0, incomplete = 0;
     std::int64_t flatElements = 0, invertedElements = 0;
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -68,21 +70,38 @@ class NearestOnDemand {
     mutable std::unique_ptr<NearestPointIndex> index_;
 };
 
+/// What a lattice point outside the mesh gets that the extension has no value for.
+enum class Outside {
+    nearest,  ///< the value at the nearest mesh point
+    missing,  ///< NaN: a file's reader has nothing there
+};
+
+/// Where the reconstruction has a point's value from.
+enum class PointSource : std::uint8_t { missing, nearest, extended, covered };
+
 /// Reads the continuous reconstruction: stored samples, except that a lattice point on the border to a
 /// coarser brick takes the value that trilinear interpolation in the coarse brick gives there, and a point
-/// outside the mesh takes the value at the nearest mesh point. Thread-safe.
+/// outside the mesh takes the extension's value, or that at the nearest mesh point. Thread-safe.
 class Reconstruction {
   public:
     Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                   const BrickStore& store, const NearestPointIndex& nearest);
-    Reconstruction(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                   const BrickStore& store, const NearestOnDemand& nearest);
+                   const BrickStore& store, const NearestOnDemand& nearest,
+                   Outside outside = Outside::nearest);
     /// At point `p` of the lattice of `level`, which must lie in the closed box of a leaf of that level.
     SeamValue at(int level, const Vec3i& p, int channel) const;
-    /// The same for several channels at once: values.size() of them from `firstChannel` on; none asks for
-    /// coverage only. Returns whether the point (when interpolated: every coarse corner it depends on) is in
-    /// the mesh.
-    bool resolve(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
+    /// The same for several channels at once: values.size() of them from `firstChannel` on; none asks for the
+    /// source only. Of an interpolated point the source is the least of those of the corners it depends on.
+    /// `p` may lie in the closed box of a leaf of any level, and outside all.
+    PointSource resolve(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
+    bool isCovered(int level, const Vec3i& p) const {
+        return resolve(level, p, 0, {}) == PointSource::covered;
+    }
+    /// Calls visit(level, p) for every point outside the mesh that the value at `p` depends on, as a point of
+    /// the leaf that owns it, or of the last level looked at when none does.
+    using VisitOutside = std::function<void(int level, const Vec3i& p)>;
+    void visitOutside(int level, const Vec3i& p, const VisitOutside& visit) const;
+    /// All channels at the mesh point nearest to lattice point `p`; NaN for a mesh without elements.
+    void nearestValues(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
     /// Trilinear value at a place inside a leaf's closed box, in index space of the leaf's level. @param
     /// coveredCorners receives how many of the cell's corners are in the mesh, when not null (corners of
     /// weight zero have no say and count as if they were).
@@ -90,33 +109,25 @@ class Reconstruction {
                        int* coveredCorners = nullptr) const;
 
   private:
-    bool stored(std::size_t leaf, const Vec3i& local, int level, const Vec3i& p, int firstChannel,
-                std::span<double> values) const;
-    bool fromCoarse(int level, const Vec3i& p, int coarse, int firstChannel, std::span<double> values) const;
-    void nameChannels(std::span<const int> fields);
-    bool outside(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
+    // A lattice point as a point of its owner, or of the coarser leaf that it is interpolated in.
+    struct Owner {
+        std::int64_t leaf = -1;  // -1: none
+        int level = 0;
+        Vec3i point{0};
+        bool isInterpolated = false;  // `level` is that of the coarser leaf, `point` is of the asked level
+    };
+    Owner findOwner(int level, const Vec3i& p) const;
+    PointSource fromCoarse(int level, const Vec3i& p, int coarse, int firstChannel,
+                           std::span<double> values) const;
+    PointSource outside(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
+    const Tile* coveredTile(const Owner& owner) const;
 
     const TetMesh* mesh_;
     const BrickTree* tree_;
     const BrickStore* store_;
-    const NearestPointIndex* nearest_ = nullptr;
-    const NearestOnDemand* nearestOnDemand_ = nullptr;
+    const NearestOnDemand* nearest_;
+    Outside outside_;
     std::vector<std::pair<int, int>> channelOf_;  // (field, component) of each channel
 };
-
-/// One layer-by-layer extension of the samples outside the mesh: points within `layers` steps (26 neighbours)
-/// of a covered point of the same level that no other leaf owns, with the value at the nearest mesh point.
-struct ExtensionPoint {
-    Vec3i index;  ///< lattice index at `level`
-    int level = 0;
-    std::uint32_t firstValue = 0;  ///< offset into ExtensionPoints::values, `channels` consecutive floats
-};
-struct ExtensionPoints {
-    std::vector<ExtensionPoint> points;  ///< ascending by level, z, y, x; each point once
-    std::vector<float> values;
-};
-ExtensionPoints extendOutside(const TetMesh& mesh, std::span<const int> fields, const BrickTree& tree,
-                              const BrickStore& store, const NearestPointIndex& nearest, int layers,
-                              const Execution& execution);
 
 }  // namespace tessera

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/timer.h"
-#include "compare/voxel_mesh.h"
+#include "verify/voxel_mesh.h"
 
 namespace tessera {
 
@@ -23,7 +23,7 @@ class Comparison {
           voxels_(mesh, grid.lattice, execution.threadCount()),
           checker_(mesh, voxels_, fields, options.boundaryVoxels) {
         for (const ContestantReport& c : report.contestants)
-            bounds_.push_back({c.spillVoxels, c.placeVoxels, c.format});
+            bounds_.push_back({c.spillVoxels, c.placeVoxels, c.format, {}, false});
         report.pairs.resize(report.contestants.size() - 1);
         for (std::size_t p = 0; p < report.pairs.size(); ++p)
             meters_.emplace_back(mesh, fields, options.thinVoxels);

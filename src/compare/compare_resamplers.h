@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "compare/difference_meter.h"
-#include "compare/point_checker.h"
 #include "compare/run_times.h"
 #include "compare/sampling_grid.h"
 #include "resample/resampler.h"
+#include "verify/point_checker.h"
 
 namespace tessera {
 

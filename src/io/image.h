@@ -57,11 +57,12 @@ struct SliceOptions {
     /// Which lattice points of the slice's frame lie in the mesh (x fastest); empty: a pixel does when the
     /// nearest stored lattice point does.
     std::vector<std::uint8_t> coverage;
-    int axis = 2;              ///< 0, 1, 2: the cut is normal to x, y or z
-    double positionWorld = 0;  ///< along that axis
-    int pixels = 800;          ///< along the longer edge of the picture
-    Box3d boundsWorld;         ///< what the picture shows; empty: all bricks
-    bool outlines = false;     ///< mark the edges of the bricks
+    int axis = 2;                         ///< 0, 1, 2: the cut is normal to x, y or z
+    double positionWorld = 0;             ///< along that axis
+    int pixels = 800;                     ///< along the longer edge of the picture
+    Box3d boundsWorld;                    ///< what the picture shows; empty: all bricks
+    bool outlines = false;                ///< mark the edges of the bricks
+    const BrickTree* outlined = nullptr;  ///< whose bricks; null: those that are sampled
 };
 
 /// The places of a slice's pixels: the centre of pixel (x, y), y downwards, is lattice point (x, height - 1 -

@@ -91,6 +91,7 @@ std::string reportToJson(const ErrorReport& report) {
     json["nodes"] = report.nodes;
     json["centroids"] = report.centroids;
     json["outside_bricks"] = report.outsideBricks;
+    if (report.incomplete > 0) json["incomplete_samples"] = report.incomplete;
     json["covered_points"] = report.coveredPoints;
     json["flat_elements"] = report.flatElements;
     json["inverted_elements"] = report.invertedElements;
@@ -106,6 +107,7 @@ ErrorReport reportFromJson(const std::string& text) {
         read(json, "nodes", report.nodes);
         read(json, "centroids", report.centroids);
         read(json, "outside_bricks", report.outsideBricks);
+        if (json.contains("incomplete_samples")) read(json, "incomplete_samples", report.incomplete);
         read(json, "covered_points", report.coveredPoints);
         read(json, "flat_elements", report.flatElements);
         read(json, "inverted_elements", report.invertedElements);

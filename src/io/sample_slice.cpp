@@ -75,13 +75,16 @@ ScalarImage sampleSlice(const BrickTree& tree, const Reconstruction& reconstruct
             const Vec3d place = frame.lattice.worldFromIndex({double(x), double(up), 0.0});
             const Vec3d index0 = (place - tree.originWorld()) / tree.spacingWorld(0);
             const std::int64_t leaf = tree.findLeafAt(index0);
-            leafOf[i] = leaf;
+            const BrickTree* outlined = options.outlined;
+            leafOf[i] =
+                outlined ? outlined->findLeafAt((place - outlined->originWorld()) / outlined->spacingWorld(0))
+                         : leaf;
             if (leaf < 0) continue;
             const int level = tree.leaves()[std::size_t(leaf)].level;
             const Vec3d index = index0 * std::ldexp(1.0, -level);
             const bool inMesh =
                 options.coverage.empty()
-                    ? reconstruction.resolve(level, Vec3i(glm::floor(index + 0.5)), channel, {})
+                    ? reconstruction.isCovered(level, Vec3i(glm::floor(index + 0.5)))
                     : options.coverage[std::size_t(up) * std::size_t(image.width) + std::size_t(x)] != 0;
             if (!inMesh) continue;
             image.values[i] = float(reconstruction.interpolate(std::size_t(leaf), index, channel));

@@ -37,9 +37,8 @@ struct VdbWriteOptions {
     UpAxis upAxis = UpAxis::keep;
     double unitScale =
         0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
-    std::int64_t maxFlatVoxels = 0;    ///< flat: bound on points; 0: 2^26. Never above 2^31.
-    std::int64_t maxFlatBytes = 0;     ///< flat: bound on the grids' memory; 0: a quarter of the machine's
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
+    int layers = 0;                    ///< of the store's extension
     std::string algorithm, criterion, sourceFile;
     std::string target;        ///< the device, of algorithms whose results depend on it; else empty
     std::string sampleFormat;  ///< what values were kept in while sampling; empty: 32-bit floats
@@ -50,52 +49,52 @@ struct VdbWriteOptions {
 struct VdbWriteResult {
     std::int64_t activeVoxels = 0;  ///< of all grids
     std::int64_t fileBytes = 0;
-    int flatLevel = 0;  ///< flat: the level whose spacing the grid has (above 0 when a bound capped it)
     double unitScale = 1;
-    std::vector<std::string> notes;  ///< sentences for the user: unit chosen, size capped
+    std::vector<std::string> notes;  ///< sentences for the user: unit chosen, places rounded
 };
 
 /// Throws InputError when two grids would get the same name, or a field the name of the coverage mask. Call
 /// it before long work.
 void checkOutputFields(const std::vector<OutputField>& fields);
 
-/// The grid that the flat layout makes of some bricks.
-struct FlatGridPlan {
-    int level = 0;            ///< the finest one within the bounds of VdbWriteOptions
-    std::int64_t points = 0;  ///< of all bricks at that level's spacing
-    std::int64_t bytes = 0;   ///< values of all channels, and the coverage
-    std::string note;         ///< a sentence for the user when a bound capped it, else empty
-};
+/// Which of some grids are stored in half floats: those whose largest magnitude they can hold. The same
+/// before and after rounding. One entry a grid of planGrids(fields).
+std::vector<bool> gridsInHalf(const std::vector<OutputField>& fields, const BrickStore& store);
 
-/// What writeVdb with VdbLayout::flat would make.
-FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const VdbWriteOptions& options);
+/// Rounds the values of some of those grids as their file will.
+void roundToHalf(const std::vector<OutputField>& fields, const std::vector<bool>& toHalf, BrickStore& store,
+                 const Execution& execution);
 
-/// Writes the samples (layout: docs/vdb_layout.md) and frees the store's tiles on the way. Nothing stands at
-/// `path` until the file is whole. Throws IoError (not writable, disk full), InputError (a unit that OpenVDB
-/// can't take, clashing names), Cancelled. The file depends on the arguments only: the same bytes for any
-/// number of threads.
-/// @param extension may be null. @param reconstruction is needed for VdbLayout::flat only.
+/// Writes the samples and their extension (layout: docs/vdb_layout.md) and frees the store's tiles on the
+/// way. In the flat layout the result comes from `flatten`. Nothing stands at `path` until the file is whole.
+/// Throws IoError (not writable, disk full), InputError (a unit that OpenVDB can't take, clashing names),
+/// Cancelled. The file depends on the arguments only: the same bytes for any number of threads.
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
-                        const ExtensionPoints* extension, const Reconstruction* reconstruction,
                         const VdbWriteOptions& options, const Execution& execution);
 
 /// A file read back.
 struct VdbFile {
-    BrickTree tree;
-    BrickStore store;  ///< levels layout only
+    BrickTree
+        tree;  ///< of the store: the bricks, or in the flat layout the grid cut into bricks of one level
+    BrickStore store;                 ///< samples and extension
+    std::optional<BrickTree> bricks;  ///< flat: the bricks that the grid was made of
     std::vector<OutputField> fields;
-    ErrorReport report;  ///< as stated in the file
+    ErrorReport report;                        ///< as stated in the file: what its voxels show
+    std::optional<ErrorReport> samplesReport;  ///< what the samples showed before, where that differs
+    int layers = 0;                            ///< of the extension
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
     std::string target, sampleFormat, repair;  ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
+    double voxelShift = 0;             ///< of the grids' places, in voxels of each along the mesh's axes
     bool halfFloat = false;            ///< values were rounded to half floats
     std::optional<Box3d> boundsWorld;  ///< the box that was asked for: no error was measured outside it
     float background = 0;
-    int flatLevel = 0;  ///< flat: the level whose spacing the grids have
+    int flatLevel = 0;  ///< flat: of `bricks`, the level whose spacing the grids have
     std::vector<std::string> gridNames;
     std::vector<std::int64_t> gridVoxels;  ///< active voxels, one a grid
+    std::int64_t strayValues = 0;          ///< inactive voxels that hold something else than the background
 };
 
 /// Throws InputError when the file is missing, damaged, no VDB file, or not written by Tessera

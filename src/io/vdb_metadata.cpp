@@ -249,6 +249,8 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_background"] = exactText(double(metadata.background));
     entries["tessera_flat_level"] = std::to_string(metadata.flatLevel);
     if (metadata.boundsWorld) entries["tessera_bounds"] = encodeBounds(*metadata.boundsWorld);
+    if (metadata.layers > 0) entries["tessera_extend"] = std::to_string(metadata.layers);
+    if (metadata.samplesReport) entries["tessera_samples_report"] = reportToJson(*metadata.samplesReport);
     entries["tessera_fields"] = encodeFields(metadata.fields);
     entries["tessera_report"] = reportToJson(metadata.report);
     entries["tessera_bricks"] = encodeTree(metadata.tree);
@@ -279,6 +281,12 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     const double flatLevel = readDouble(entry(entries, "tessera_flat_level"), "tessera_flat_level");
     if (!(flatLevel >= 0 && flatLevel < kMaxLevels)) damaged("tessera_flat_level is out of range");
     metadata.flatLevel = int(flatLevel);
+    if (const auto layers = entries.find("tessera_extend"); layers != entries.end()) {
+        const double count = readDouble(layers->second, "tessera_extend");
+        if (!(count >= 1 && count <= 64 && count == std::floor(count)))
+            damaged("tessera_extend is out of range");
+        metadata.layers = int(count);
+    }
     try {
         metadata.fields = decodeFields(entry(entries, "tessera_fields"));
         metadata.tree = decodeTree(entry(entries, "tessera_bricks"));
@@ -288,6 +296,8 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
         damaged(error.what());
     }
     metadata.report = reportFromJson(entry(entries, "tessera_report"));
+    if (const auto report = entries.find("tessera_samples_report"); report != entries.end())
+        metadata.samplesReport = reportFromJson(report->second);
     return metadata;
 }
 

@@ -13,6 +13,8 @@
 #include <fstream>
 #include <limits>
 #include <new>
+#include <unordered_set>
+#include <utility>
 
 #include "base/error.h"
 #include "io/file_digest.h"
@@ -163,20 +165,33 @@ openvdb::Coord pointOf(const Vec3i& origin, int offset) {
     return {origin.x + (offset >> 6), origin.y + (offset >> 3 & 7), origin.z + (offset & 7)};
 }
 
+using Words = std::array<std::uint64_t, 8>;
+
+template <class Node>
+Words activeWords(const Node& node) {
+    Words words;
+    for (openvdb::Index w = 0; w < 8; ++w)
+        words[w] = node.getValueMask().template getWord<openvdb::Index64>(w);
+    return words;
+}
+
+// The active points among 8^3.
+template <class Accessor>
+Words activeWords(Accessor& accessor, const Vec3i& origin) {
+    const openvdb::Coord first = pointOf(origin, 0);
+    if (const auto* node = accessor.probeConstLeaf(first)) return activeWords(*node);
+    Words words{};
+    // Another program merged the leaf node into a tile of its parent.
+    if (accessor.isValueOn(first)) words.fill(~std::uint64_t(0));
+    return words;
+}
+
 void readCoverage(const openvdb::BoolGrid& grid, int level, VdbFile& file) {
     openvdb::BoolGrid::ConstAccessor accessor = grid.getConstAccessor();
     std::uint64_t found = 0;
     forEachTilePlace(file.tree, file.store.tilesPerEdge(), level,
                      [&](std::size_t leaf, int tile, const Vec3i& origin) {
-                         std::array<std::uint64_t, 8> words{};
-                         const openvdb::Coord first = pointOf(origin, 0);
-                         if (const auto* node = accessor.probeConstLeaf(first)) {
-                             for (openvdb::Index w = 0; w < 8; ++w)
-                                 words[w] = node->getValueMask().getWord<openvdb::Index64>(w);
-                         } else if (accessor.isValueOn(first)) {
-                             // Another program merged the leaf node into a tile of its parent.
-                             words.fill(~std::uint64_t(0));
-                         }
+                         const Words words = activeWords(accessor, origin);
                          std::uint64_t count = 0;
                          for (std::uint64_t word : words) count += std::uint64_t(std::popcount(word));
                          if (count > 0) file.store.ensureTile(leaf, tile).coverage = words;
@@ -209,29 +224,103 @@ void readValues(const Grid& grid, int level, VdbFile& file, const Put& put) {
                      });
 }
 
+// Active points of a value grid that lie outside the mesh, in the bricks and beside them.
+template <class Grid, class Put>
+void readExtension(const Grid& grid, int level, VdbFile& file, const Put& put) {
+    typename Grid::ConstAccessor accessor = grid.getConstAccessor();
+    const int n = file.store.tilesPerEdge();
+    constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
+    const std::size_t values = std::size_t(file.store.channels()) * kTilePoints;
+    const auto take = [&](const Vec3i& origin, Words words, const Tile* covered) {
+        for (std::size_t w = 0; covered && w < 8; ++w) words[w] &= ~covered->coverage[w];
+        if (words == Words{}) return;
+        Tile& tile = file.store.extension()[{level, floorDiv(origin, kTileSize)}];
+        if (!tile.values) {
+            tile.values = std::make_unique<float[]>(values);
+            std::fill_n(tile.values.get(), values, kInvalid);
+        }
+        for (int offset = 0; offset < kTilePoints; ++offset) {
+            if (!((words[std::size_t(offset >> 6)] >> (offset & 63)) & 1)) continue;
+            tile.cover(offset);
+            put(tile, offset, true, accessor.getValue(pointOf(origin, offset)));
+        }
+    };
+    forEachTilePlace(file.tree, n, level, [&](std::size_t leaf, int t, const Vec3i& origin) {
+        take(origin, activeWords(accessor, origin), file.store.tile(leaf, t));
+    });
+    for (auto node = grid.tree().cbeginLeaf(); node; ++node) {
+        const openvdb::Coord& o = node->origin();
+        const Vec3i origin(o.x(), o.y(), o.z());
+        if (file.tree.findLeaf({level, floorDiv(origin, file.tree.brickCells())}) < 0)
+            take(origin, activeWords(*node), nullptr);
+        for (auto off = node->cbeginValueOff(); off; ++off) file.strayValues += *off != grid.background();
+    }
+}
+
 void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
-    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", VdbLayout::levels, level)),
-                 level, file);
+    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", file.layout, level)), level,
+                 file);
     constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
     for (const GridPlan& plan : planGrids(file.fields)) {
-        const std::string name = gridName(plan.name, VdbLayout::levels, level);
+        const std::string name = gridName(plan.name, file.layout, level);
         const auto at = [&](Tile& tile, int c, int offset) -> float& {
             return tile.values[std::size_t(plan.firstChannel + c) * kTilePoints + std::size_t(offset)];
         };
         if (plan.components == 3) {
             const auto grid = readTypedGrid<openvdb::Vec3SGrid>(source, name);
-            readValues(*grid, level, file,
-                       [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
-                           const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
-                           for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
-                       });
+            const auto put = [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
+                const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
+                for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
+            };
+            readValues(*grid, level, file, put);
+            readExtension(*grid, level, file, put);
         } else {
             const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
-            readValues(*grid, level, file, [&](Tile& tile, int offset, bool valid, float value) {
+            const auto put = [&](Tile& tile, int offset, bool valid, float value) {
                 at(tile, 0, offset) = valid ? value : kInvalid;
-            });
+            };
+            readValues(*grid, level, file, put);
+            readExtension(*grid, level, file, put);
         }
     }
+}
+
+// Adds the bricks that hold an active point of a grid.
+template <class Grid>
+void listBricks(const Grid& grid, int brickCells, std::unordered_set<BrickKey, BrickKeyHash>& keys) {
+    const auto brickOf = [&](const openvdb::Coord& c) {
+        return floorDiv(Vec3i(c.x(), c.y(), c.z()), brickCells);
+    };
+    for (auto node = grid.tree().cbeginLeaf(); node; ++node)
+        if (!node->isEmpty()) keys.insert({0, brickOf(node->origin())});
+    auto tile = grid.cbeginValueOn();
+    tile.setMaxDepth(tile.getLeafDepth() - 1);
+    for (; tile; ++tile) {
+        const openvdb::CoordBBox box = tile.getBoundingBox();
+        if (box.dim().x() > 128)
+            throw InputError("grid " + grid.getName() + " has active tiles of " +
+                             std::to_string(box.dim().x()) +
+                             " voxels along an edge, which Tessera doesn't write");
+        const Vec3i low = brickOf(box.min()), high = brickOf(box.max());
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x) keys.insert({0, {x, y, z}});
+    }
+}
+
+// The grid of a flat file as bricks of one level.
+BrickTree flatTree(openvdb::io::File& source, const VdbFile& file) {
+    std::unordered_set<BrickKey, BrickKeyHash> keys;
+    const int b = file.tree.brickCells();
+    listBricks(*readTypedGrid<openvdb::BoolGrid>(source, "coverage"), b, keys);
+    for (const GridPlan& plan : planGrids(file.fields)) {
+        if (plan.components == 3)
+            listBricks(*readTypedGrid<openvdb::Vec3SGrid>(source, plan.name), b, keys);
+        else
+            listBricks(*readTypedGrid<openvdb::FloatGrid>(source, plan.name), b, keys);
+    }
+    return BrickTree(file.tree.originWorld(), file.tree.spacingWorld(file.flatLevel), b,
+                     {keys.begin(), keys.end()});
 }
 
 void listGrids(openvdb::io::File& source, VdbFile& file) {
@@ -252,7 +341,10 @@ VdbFile readWhole(const std::string& path) {
     try {
         file = decodeMetadata(textEntries(*source.getMetadata()));
         listGrids(source, file);
-        if (file.layout == VdbLayout::flat) return file;
+        if (file.layout == VdbLayout::flat) {
+            BrickTree grid = flatTree(source, file);
+            file.bricks = std::exchange(file.tree, std::move(grid));
+        }
         int channels = 0;
         for (const OutputField& field : file.fields) channels += field.components;
         file.store = BrickStore(file.tree.brickCells(), file.tree.leafCount(), channels);

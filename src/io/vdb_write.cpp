@@ -1,7 +1,5 @@
 #include <openvdb/io/Archive.h>
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -9,11 +7,11 @@
 #include <limits>
 #include <map>
 #include <ostream>
+#include <tuple>
 
 #include "base/error.h"
 #include "io/atomic_file.h"
 #include "io/file_digest.h"
-#include "io/flat_tiles.h"
 #include "io/packed_grid.h"
 #include "io/vdb_metadata.h"
 
@@ -29,8 +27,6 @@ static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints,
 constexpr std::size_t kUuidOffset = 21;  // after magic, format, library's two version numbers and a flag
 constexpr std::size_t kUuidBytes = 36;
 
-constexpr std::int64_t kDefaultFlatPoints = std::int64_t(1) << 26;  // seconds of work
-constexpr std::int64_t kMostFlatPoints = std::int64_t(1) << 31;
 constexpr double kLost =
     std::numeric_limits<double>::infinity();  // of an error in voxels: one voxel falls on another
 
@@ -64,9 +60,16 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
     return math::Transform::Ptr(new math::Transform(math::MapBase::Ptr(new math::AffineMap(matrix))));
 }
 
-// Active bits of a tile where all given channels are finite.
-std::array<std::uint64_t, 8> finiteMask(const OutputTile& tile, int firstChannel, int components) {
-    std::array<std::uint64_t, 8> mask = tile.active;
+// 8^3 points of a grid: samples, or points outside the mesh that carry a value, or both.
+struct GridTile {
+    Vec3i origin{0};
+    const Tile* samples = nullptr;
+    const Tile* extension = nullptr;
+};
+
+// Bits of a tile where all given channels are finite.
+std::array<std::uint64_t, 8> finiteMask(const Tile& tile, int firstChannel, int components) {
+    std::array<std::uint64_t, 8> mask = tile.coverage;
     for (int c = firstChannel; c < firstChannel + components; ++c) {
         const float* values = tile.channel(c);
         for (std::size_t w = 0; w < 8; ++w) {
@@ -82,58 +85,8 @@ std::array<std::uint64_t, 8> finiteMask(const OutputTile& tile, int firstChannel
 template <class Leaf>
 void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
     for (openvdb::Index w = 0; w < 8; ++w)
-        leaf.getValueMask().template getWord<openvdb::Index64>(w) = words[w];
+        leaf.getValueMask().template getWord<openvdb::Index64>(w) |= words[w];
 }
-
-// A point outside the mesh that gets a value.
-struct ExtendedPoint {
-    openvdb::Coord index;
-    const float* values;  // of all channels
-};
-
-// The points outside the mesh that lie on one grid's lattice, by tile.
-class ExtendedTiles {
-  public:
-    // In the flat layout a finer level's points count where they are points of the grid too.
-    ExtendedTiles(const ExtensionPoints* extension, VdbLayout layout, int level) {
-        if (!extension) return;
-        for (const ExtensionPoint& point : extension->points) {
-            const int shift = level - point.level;
-            if (shift < 0 || (shift > 0 && layout == VdbLayout::levels)) continue;
-            const int mask = (1 << shift) - 1;
-            if ((point.index.x & mask) || (point.index.y & mask) || (point.index.z & mask)) continue;
-            const openvdb::Coord index(point.index.x >> shift, point.index.y >> shift,
-                                       point.index.z >> shift);
-            tiles_[index & ~(kTileSize - 1)].push_back({index, extension->values.data() + point.firstValue});
-        }
-    }
-    // Gives the points of a tile away.
-    std::vector<ExtendedPoint> take(const Vec3i& origin) {
-        const auto found = tiles_.find(coord(origin));
-        if (found == tiles_.end()) return {};
-        std::vector<ExtendedPoint> points = std::move(found->second);
-        tiles_.erase(found);
-        return points;
-    }
-    // Calls visit with the tiles that nobody took, without a point of the mesh, in batches.
-    template <class Visit>
-    void forEachOther(int channels, const Visit& visit) {
-        while (!tiles_.empty()) {
-            std::vector<OutputTile> batch;
-            for (auto tile = tiles_.begin(); tile != tiles_.end() && batch.size() < kBatchTiles; ++tile) {
-                OutputTile& made = batch.emplace_back();
-                made.origin = {tile->first.x(), tile->first.y(), tile->first.z()};
-                made.owned = std::make_unique<float[]>(std::size_t(channels) * kTilePoints);
-                made.values = made.owned.get();
-            }
-            visit(batch);  // which takes their points
-        }
-    }
-
-  private:
-    static constexpr std::size_t kBatchTiles = 1024;
-    std::map<openvdb::Coord, std::vector<ExtendedPoint>> tiles_;
-};
 
 // The grid of one plan at one level, or the coverage mask.
 class GridBuilder {
@@ -141,8 +94,7 @@ class GridBuilder {
     virtual ~GridBuilder() = default;
     virtual void reserve(std::size_t tiles) = 0;
     // Makes and compresses the leaf node of a tile of a batch; may be called for several at once.
-    virtual void makeLeaf(std::size_t position, const OutputTile& tile,
-                          const std::vector<ExtendedPoint>& extended) = 0;
+    virtual void makeLeaf(std::size_t position, const GridTile& tile) = 0;
     // Puts the leaf nodes made since into the tree.
     virtual void addLeaves() = 0;
     virtual openvdb::GridBase::Ptr grid() const = 0;
@@ -160,10 +112,10 @@ class BuilderOf : public GridBuilder {
     }
 
     void reserve(std::size_t tiles) override { made_.resize(tiles); }
-    void makeLeaf(std::size_t position, const OutputTile& tile,
-                  const std::vector<ExtendedPoint>& extended) override {
+    void makeLeaf(std::size_t position, const GridTile& tile) override {
         Leaf leaf(coord(tile.origin), grid_->background());
-        fill(leaf, tile, extended);
+        if (tile.samples) fill(leaf, *tile.samples);
+        if (tile.extension && isExtended()) fill(leaf, *tile.extension);
         if (leaf.isEmpty()) return;
         auto maskOnly = std::make_unique<Leaf>(openvdb::PartialCreate(), leaf.origin(), grid_->background());
         maskOnly->setValueMask(leaf.getValueMask());
@@ -179,8 +131,8 @@ class BuilderOf : public GridBuilder {
     void describe() override { grid_->describe(); }
 
   protected:
-    virtual void fill(Leaf& leaf, const OutputTile& tile,
-                      const std::vector<ExtendedPoint>& extended) const = 0;
+    virtual void fill(Leaf& leaf, const Tile& tile) const = 0;
+    virtual bool isExtended() const { return true; }
 
   private:
     std::shared_ptr<PackedGrid<Grid>> grid_;
@@ -190,26 +142,19 @@ class BuilderOf : public GridBuilder {
 class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
   public:
     ScalarBuilder(int channel, float background, bool toHalf)
-        : BuilderOf(background, toHalf), channel_(channel), background_(background) {}
+        : BuilderOf(background, toHalf), channel_(channel) {}
 
   private:
-    void fill(FloatLeaf& leaf, const OutputTile& tile,
-              const std::vector<ExtendedPoint>& extended) const override {
+    void fill(FloatLeaf& leaf, const Tile& tile) const override {
         const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 1);
         float* values = leaf.buffer().data();
-        std::memcpy(values, tile.channel(channel_), kTilePoints * sizeof(float));
-        for (std::size_t i = 0; i < kTilePoints; ++i) {
-            if (!(mask[i >> 6] >> (i & 63) & 1)) values[i] = background_;
-        }
+        const float* from = tile.channel(channel_);
+        for (std::size_t i = 0; i < kTilePoints; ++i)
+            if (mask[i >> 6] >> (i & 63) & 1) values[i] = from[i];
         setMask(leaf, mask);
-        for (const ExtendedPoint& point : extended) {
-            const float value = point.values[channel_];
-            if (std::isfinite(value) && !leaf.isValueOn(point.index)) leaf.setValueOn(point.index, value);
-        }
     }
 
     int channel_;
-    float background_;
 };
 
 class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
@@ -218,22 +163,14 @@ class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
         : BuilderOf(openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
 
   private:
-    void fill(Vec3fLeaf& leaf, const OutputTile& tile,
-              const std::vector<ExtendedPoint>& extended) const override {
+    void fill(Vec3fLeaf& leaf, const Tile& tile) const override {
         const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 3);
         openvdb::Vec3f* values = leaf.buffer().data();
         const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1),
                     *z = tile.channel(channel_ + 2);
-        for (std::size_t i = 0; i < kTilePoints; ++i) {
+        for (std::size_t i = 0; i < kTilePoints; ++i)
             if (mask[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
-        }
         setMask(leaf, mask);
-        for (const ExtendedPoint& point : extended) {
-            const float* v = point.values + channel_;
-            if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2])) continue;
-            if (leaf.isValueOn(point.index)) continue;
-            leaf.setValueOn(point.index, turned({v[0], v[1], v[2]}, upAxis_));
-        }
     }
 
     int channel_;
@@ -245,10 +182,11 @@ class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
     CoverageBuilder() : BuilderOf(false, false) {}
 
   private:
-    void fill(BoolLeaf& leaf, const OutputTile& tile, const std::vector<ExtendedPoint>&) const override {
+    void fill(BoolLeaf& leaf, const Tile& tile) const override {
         setMask(leaf, tile.coverage);
         leaf.buffer() = BoolLeaf::Buffer(leaf.getValueMask());
     }
+    bool isExtended() const override { return false; }
 };
 
 // All grids of one level.
@@ -274,90 +212,117 @@ LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bo
     return grids;
 }
 
-void addTiles(LevelGrids& grids, std::span<const OutputTile> tiles,
-              const std::vector<std::vector<ExtendedPoint>>& extended, const Execution& execution) {
+void addTiles(LevelGrids& grids, std::span<const GridTile> tiles, const Execution& execution) {
+    execution.throwIfCancelled();
     for (auto& builder : grids.builders) builder->reserve(tiles.size());
     parallelForChunks(execution, std::int64_t(tiles.size()), 64, [&](std::int64_t begin, std::int64_t end) {
         for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
-            for (auto& builder : grids.builders) builder->makeLeaf(i, tiles[i], extended[i]);
+            for (auto& builder : grids.builders) builder->makeLeaf(i, tiles[i]);
         }
     });
     parallelFor(execution, std::int64_t(grids.builders.size()),
                 [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
 }
 
+// The tiles of one level in batches; frees them on the way.
+void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& store,
+              const Execution& execution) {
+    constexpr std::size_t kBatchTiles = 4096;
+    struct Place {
+        std::size_t leaf;
+        int tile;
+        GridTile grid;
+    };
+    const int n = store.tilesPerEdge();
+    std::vector<Place> places;
+    for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+        if (tree.leaves()[leaf].level != level) continue;
+        const Vec3i first = tree.ownedPoints(tree.leaves()[leaf]).min;
+        for (int t = 0; t < store.tileCount(); ++t) {
+            const Tile* tile = store.tile(leaf, t);
+            if (!tile) continue;
+            const Vec3i origin = first + Vec3i(t / (n * n), t / n % n, t % n) * kTileSize;
+            const auto extended = store.extension().find({level, floorDiv(origin, kTileSize)});
+            places.push_back(
+                {leaf, t, {origin, tile, extended == store.extension().end() ? nullptr : &extended->second}});
+        }
+    }
+    // Tiles of the extension alone.
+    const auto hasSamples = [&](const Vec3i& tile) {
+        const Vec3i brick = floorDiv(tile, n), local = tile - brick * n;
+        const std::int64_t leaf = tree.findLeaf({level, brick});
+        return leaf >= 0 && store.tile(std::size_t(leaf), (local.x * n + local.y) * n + local.z);
+    };
+    const std::size_t withSamples = places.size();
+    for (const auto& [key, tile] : store.extension())
+        if (key.level == level && !hasSamples(key.index))
+            places.push_back({0, -1, {key.index * kTileSize, nullptr, &tile}});
+    std::sort(places.begin() + std::ptrdiff_t(withSamples), places.end(), [](const Place& a, const Place& b) {
+        const Vec3i &p = a.grid.origin, &q = b.grid.origin;
+        return std::tie(p.z, p.y, p.x) < std::tie(q.z, q.y, q.x);
+    });
+    for (std::size_t begin = 0; begin < places.size(); begin += kBatchTiles) {
+        const std::size_t end = std::min(places.size(), begin + kBatchTiles);
+        execution.report("write", std::int64_t(begin), std::int64_t(places.size()));
+        std::vector<GridTile> batch;
+        for (std::size_t i = begin; i < end; ++i) batch.push_back(places[i].grid);
+        addTiles(grids, batch, execution);
+        for (std::size_t i = begin; i < end; ++i)
+            if (places[i].tile >= 0) store.release(places[i].leaf, places[i].tile);
+    }
+}
+
 std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf,
-                                   BrickResult& result, const ExtensionPoints* extension,
-                                   const Reconstruction* reconstruction, const VdbWriteOptions& options,
-                                   int flatLevel, const Execution& execution) {
-    const bool flat = options.layout == VdbLayout::flat;
+                                   BrickResult& result, const VdbWriteOptions& options,
+                                   const Execution& execution) {
     std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
     for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
+    for (const auto& [key, tile] : result.store.extension()) present.at(std::size_t(key.level)) = true;
     std::vector<LevelGrids> all;
-    for (int level = 0; level < (flat ? 1 : result.tree.levelCount()); ++level) {
-        if (!flat && !present[std::size_t(level)]) continue;
-        const int gridLevel = flat ? flatLevel : level;
-        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, gridLevel, options));
-        ExtendedTiles outside(extension, options.layout, gridLevel);
-        const TileBatchSink sink = [&](std::span<const OutputTile> tiles) {
-            execution.throwIfCancelled();
-            std::vector<std::vector<ExtendedPoint>> extended;
-            for (const OutputTile& tile : tiles) extended.push_back(outside.take(tile.origin));
-            addTiles(grids, tiles, extended, execution);
-        };
-        if (flat) {
-            forEachFlatTile(result.tree, result.store, reconstruction, extension, gridLevel, execution, sink);
-        } else {
-            forEachLevelTile(result.tree, result.store, level, execution, sink);
-        }
-        outside.forEachOther(result.store.channels(), sink);
+    for (int level = 0; level < result.tree.levelCount(); ++level) {
+        if (!present[std::size_t(level)]) continue;
+        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, level, options));
+        addLevel(grids, level, result.tree, result.store, execution);
     }
+    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, 0, options));
     return all;
 }
 
 // The largest magnitude of a plan's values, in the mesh and beside it. As in the grid, a vector that isn't
 // finite as a whole doesn't count.
-float largestMagnitude(const BrickStore& store, const ExtensionPoints* extension, const GridPlan& plan) {
+float largestMagnitude(const BrickStore& store, const GridPlan& plan) {
     float largest = 0;
-    const auto take = [&](const auto& component) {
-        float magnitude = 0;
-        for (int c = plan.firstChannel; c < plan.firstChannel + plan.components; ++c) {
-            if (!std::isfinite(component(c))) return;
-            magnitude = std::max(magnitude, std::abs(component(c)));
-        }
-        largest = std::max(largest, magnitude);
+    const auto take = [&](const Tile& tile) {
+        const std::array<std::uint64_t, 8> mask = finiteMask(tile, plan.firstChannel, plan.components);
+        for (int c = plan.firstChannel; c < plan.firstChannel + plan.components; ++c)
+            for (std::size_t i = 0; i < kTilePoints; ++i)
+                if (mask[i >> 6] >> (i & 63) & 1) largest = std::max(largest, std::abs(tile.channel(c)[i]));
     };
-    for (std::size_t leaf = 0; leaf < store.leafCount(); ++leaf) {
-        for (int t = 0; t < store.tileCount(); ++t) {
-            const Tile* tile = store.tile(leaf, t);
-            for (int i = 0; tile && i < kTilePoints; ++i) {
-                if (tile->covered(i)) take([&](int c) { return tile->channel(c)[i]; });
-            }
-        }
-    }
-    if (!extension) return largest;
-    for (const ExtensionPoint& point : extension->points)
-        take([&](int c) { return extension->values[point.firstValue + std::size_t(c)]; });
+    for (std::size_t leaf = 0; leaf < store.leafCount(); ++leaf)
+        for (int t = 0; t < store.tileCount(); ++t)
+            if (const Tile* tile = store.tile(leaf, t)) take(*tile);
+    for (const auto& [key, tile] : store.extension()) take(tile);
     return largest;
 }
 
-// Half floats end at 65504 and lose digits below 6.1e-5.
+// Half floats end at 65504 and lose digits below 6.1e-5. Both ends are half floats, so that rounding a value
+// doesn't move it across.
 bool fitsHalf(float largest) {
-    return largest == 0 || (largest <= 65504.0f && largest >= 6.2e-5f);
+    return largest == 0 || (largest <= 65504.0f && largest >= 0x1.04p-14f);
 }
 
 // Which plans are written in half floats: those asked for that fit.
-std::vector<bool> choosePrecision(const std::vector<GridPlan>& plans, const BrickStore& store,
-                                  const ExtensionPoints* extension, const VdbWriteOptions& options,
-                                  VdbWriteResult& result) {
-    std::vector<bool> toHalf(plans.size(), false);
-    for (std::size_t p = 0; options.halfFloat && p < plans.size(); ++p) {
-        const float largest = largestMagnitude(store, extension, plans[p]);
-        toHalf[p] = fitsHalf(largest);
+std::vector<bool> choosePrecision(const std::vector<OutputField>& fields, const BrickStore& store,
+                                  const VdbWriteOptions& options, VdbWriteResult& result) {
+    const std::vector<GridPlan> plans = planGrids(fields);
+    if (!options.halfFloat) return std::vector<bool>(plans.size(), false);
+    const std::vector<bool> toHalf = gridsInHalf(fields, store);
+    for (std::size_t p = 0; p < plans.size(); ++p) {
         if (toHalf[p]) continue;
-        result.notes.push_back(
-            "grid " + plans[p].name + " is written in full floats: its largest magnitude " +
-            exactText(double(largest)) + " is outside what half floats hold (6.2e-05 to 65504)");
+        result.notes.push_back("grid " + plans[p].name +
+                               " is written in full floats: its largest magnitude " +
+                               exactText(double(largestMagnitude(store, plans[p]))) +
+                               " is outside what half floats hold (6.2e-05 to 65504)");
     }
     return toHalf;
 }
@@ -366,14 +331,15 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
                   double unitScale, UpAxis upAxis) {
     grid.setName(name);
     grid.setTransform(makeTransform(tree, level, unitScale, upAxis));
-    grid.insertMeta("tessera_level", openvdb::Int32Metadata(level));
     grid.insertMeta("tessera_spacing", openvdb::StringMetadata(exactText(tree.spacingWorld(level))));
     grid.insertMeta("tessera_unit_scale", openvdb::StringMetadata(exactText(unitScale)));
 }
 
 // Grids in the order of the file: field by field, each with its finest level first, then the coverage.
+// `flatLevel` is what the level is called of the bricks that a flat grid was made of.
 openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
-                                 const BrickTree& tree, const VdbWriteOptions& options, double unitScale) {
+                                 const BrickTree& tree, const VdbWriteOptions& options, double unitScale,
+                                 int flatLevel) {
     openvdb::GridCPtrVec ordered;
     for (std::size_t p = 0; p <= plans.size(); ++p) {
         const bool coverage = p == plans.size();
@@ -382,6 +348,7 @@ openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const st
             const std::string base = coverage ? "coverage" : plans[p].name;
             describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
                          options.upAxis);
+            grid.insertMeta("tessera_level", openvdb::Int32Metadata(grids.level + flatLevel));
             grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
             if (!coverage)
                 grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME
@@ -468,9 +435,10 @@ void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids,
 VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
                          const VdbWriteOptions& options, const VdbWriteResult& written) {
     VdbMetadata metadata;
-    metadata.tree = result.tree;
+    metadata.tree = result.bricks ? *result.bricks : result.tree;
     metadata.fields = fields;
     metadata.report = result.report;
+    metadata.samplesReport = result.samplesReport;
     metadata.layout = options.layout;
     metadata.version = TESSERA_VERSION;
     metadata.sourceFile = options.sourceFile;
@@ -484,14 +452,9 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.halfFloat = options.halfFloat;
     metadata.background = options.background;
     metadata.boundsWorld = options.boundsWorld;
-    metadata.flatLevel = written.flatLevel;
+    metadata.layers = options.layers;
+    metadata.flatLevel = result.flatLevel;
     return metadata;
-}
-
-std::int64_t quarterOfMemory() {
-    const long pages = sysconf(_SC_PHYS_PAGES), pageBytes = sysconf(_SC_PAGE_SIZE);
-    return pages > 0 && pageBytes > 0 ? std::int64_t(pages) * pageBytes / 4
-                                      : std::numeric_limits<std::int64_t>::max();
 }
 
 /// How far the file's transform puts the furthest sample from its place, in finest voxels. OpenVDB takes the
@@ -523,8 +486,7 @@ void checkPlace(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteR
                                " voxels; tessera_bricks in the file is exact");
 }
 
-void chooseFrame(const BrickTree& tree, int channels, const VdbWriteOptions& options,
-                 VdbWriteResult& result) {
+void chooseUnit(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteResult& result) {
     result.unitScale = chooseUnitScale(tree.spacingWorld(0), options.unitScale);
     if (options.unitScale == 0 && result.unitScale != 1) {
         result.notes.push_back("the finest voxel, " + exactText(tree.spacingWorld(0)) +
@@ -533,60 +495,54 @@ void chooseFrame(const BrickTree& tree, int channels, const VdbWriteOptions& opt
                                " of the mesh's (see tessera_unit_scale in the file)");
     }
     checkPlace(tree, options, result);
-    if (options.layout == VdbLayout::levels) return;
-    FlatGridPlan plan = planFlatGrid(tree, channels, options);
-    result.flatLevel = plan.level;
-    if (!plan.note.empty()) result.notes.push_back(std::move(plan.note));
 }
 
 }  // namespace
 
-FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const VdbWriteOptions& options) {
-    const double pointBytes = 4.0 * channels + 0.125;
-    const std::int64_t maxBytes = options.maxFlatBytes > 0 ? options.maxFlatBytes : quarterOfMemory();
-    const std::int64_t byMemory = std::int64_t(double(maxBytes) / pointBytes);
-    const std::int64_t byCount =
-        options.maxFlatVoxels > 0 ? std::min(options.maxFlatVoxels, kMostFlatPoints) : kDefaultFlatPoints;
-    const std::int64_t limit = std::min(byCount, byMemory);
-    FlatGridPlan plan;
-    plan.level = chooseFlatLevel(tree, limit);
-    const double points = flatPointCount(tree, plan.level);
-    plan.points = std::int64_t(std::ceil(points));
-    plan.bytes = std::int64_t(std::ceil(points * pointBytes));
-    if (plan.level == 0) return plan;
-    // Where memory decides, more voxels alone would change nothing.
-    std::string more = "give a larger --max-voxels for a finer grid";
-    if (byCount >= kMostFlatPoints && byMemory >= kMostFlatPoints) {
-        more = "no flat grid can hold more; --layout levels keeps every level";
-    } else if (byMemory < byCount) {
-        more = "the memory allowed for it decides: give a larger --max-memory";
-        if (options.maxFlatVoxels == 0) more += " and --max-voxels";
-        more += " for a finer grid";
-    }
-    plan.note = "the flat grid has spacing " + exactText(tree.spacingWorld(plan.level)) + " (level " +
-                std::to_string(plan.level) + ") instead of " + exactText(tree.spacingWorld(0)) +
-                ": at the finest it would hold " +
-                std::to_string(std::int64_t(std::min(flatPointCount(tree, 0), 9e18))) +
-                " voxels, the limit is " + std::to_string(limit) + "; " + more;
-    return plan;
+std::vector<bool> gridsInHalf(const std::vector<OutputField>& fields, const BrickStore& store) {
+    std::vector<bool> toHalf;
+    for (const GridPlan& plan : planGrids(fields)) toHalf.push_back(fitsHalf(largestMagnitude(store, plan)));
+    return toHalf;
+}
+
+void roundToHalf(const std::vector<OutputField>& fields, const std::vector<bool>& toHalf, BrickStore& store,
+                 const Execution& execution) {
+    const std::vector<GridPlan> plans = planGrids(fields);
+    std::vector<int> channels;
+    for (std::size_t p = 0; p < plans.size(); ++p)
+        for (int c = 0; toHalf[p] && c < plans[p].components; ++c)
+            channels.push_back(plans[p].firstChannel + c);
+    const auto round = [&](Tile& tile) {
+        for (const int c : channels) {
+            float* values = tile.values.get() + std::size_t(c) * kTilePoints;
+            for (std::size_t i = 0; i < kTilePoints; ++i)
+                values[i] = openvdb::io::RealToHalf<float>::convert(values[i]);
+        }
+    };
+    parallelFor(execution, std::int64_t(store.leafCount()), [&](std::int64_t leaf) {
+        for (int t = 0; t < store.tileCount(); ++t)
+            if (Tile* tile = store.tile(std::size_t(leaf), t)) round(*tile);
+    });
+    for (auto& [key, tile] : store.extension()) round(tile);
 }
 
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
-                        const ExtensionPoints* extension, const Reconstruction* reconstruction,
                         const VdbWriteOptions& options, const Execution& execution) {
     checkOutputFields(fields);
+    TESSERA_CHECK((options.layout == VdbLayout::flat) == result.bricks.has_value(),
+                  "a flat grid is made by flatten");
     VdbWriteResult written;
-    chooseFrame(result.tree, result.store.channels(), options, written);
+    chooseUnit(result.tree, options, written);
     AtomicFile file(path);
     openvdb::initialize();
     const std::vector<GridPlan> plans = planGrids(fields);
     for (const GridPlan& plan : plans)
         TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
                       "a field's channels are in the store");
-    const std::vector<bool> toHalf = choosePrecision(plans, result.store, extension, options, written);
-    const std::vector<LevelGrids> levels =
-        buildGrids(plans, toHalf, result, extension, reconstruction, options, written.flatLevel, execution);
-    const openvdb::GridCPtrVec grids = finishGrids(levels, plans, result.tree, options, written.unitScale);
+    const std::vector<bool> toHalf = choosePrecision(fields, result.store, options, written);
+    const std::vector<LevelGrids> levels = buildGrids(plans, toHalf, result, options, execution);
+    const openvdb::GridCPtrVec grids =
+        finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
     for (const openvdb::GridBase::ConstPtr& grid : grids)
         written.activeVoxels += std::int64_t(grid->activeVoxelCount());
     writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written)), execution);

@@ -26,5 +26,5 @@ int main(int argc, char** argv) {
         outputs.push_back({field.name, field.name, onPoints ? "point" : "cell", field.components, channel});
         channel += field.components;
     }
-    tessera::writeVdb(argv[2], outputs, bricks, nullptr, nullptr, {}, {});
+    tessera::writeVdb(argv[2], outputs, bricks, {}, {});
 }

@@ -1,4 +1,4 @@
-#include "compare/point_checker.h"
+#include "verify/point_checker.h"
 
 #include <algorithm>
 #include <array>
@@ -15,6 +15,8 @@ namespace {
 constexpr int kTileEdge = 16;
 constexpr double kSlackVoxels = 1e-9;  // far above the rounding of distances, far below every bound
 constexpr float kUndecided = 1.0f;     // as a share of what is allowed
+constexpr double kHalfUlp = 0x1p-11;        // half a unit in the last place of half floats
+constexpr double kSmallestHalf = 0x1p-25;   // the same of the smallest ones
 constexpr float kNone = std::numeric_limits<float>::infinity();
 
 /// One field component over one element: a linear function of the weights.
@@ -26,6 +28,7 @@ struct Line {
     double gradient = 0;            ///< length, per voxel
     double rounding = 0;            ///< of our own evaluation
     bool isFinite = true;
+    bool isVectorFinite = true;  ///< and so are the other components of a field of three
 
     double at(const std::array<double, 4>& w) const {
         return nodes[0] + (nodes[1] - nodes[0]) * w[1] + (nodes[2] - nodes[0]) * w[2] +
@@ -50,8 +53,8 @@ PointCheck& PointCheck::operator+=(const PointCheck& later) {
 class PointChecker::Tile {
   public:
     Tile(const PointChecker& checker, std::span<const Block> blocks, std::span<const SampleBounds> bounds,
-         const IndexBox& points)
-        : checker_(checker), blocks_(blocks), bounds_(bounds), points_(points) {
+         std::span<const PointRule> rules, const IndexBox& points)
+        : checker_(checker), blocks_(blocks), bounds_(bounds), rules_(rules), points_(points) {
         for (const SampleBounds& b : bounds) reach_ = std::max(reach_, b.spillVoxels);
         reach_ = std::max(reach_, checker.reachVoxels_) + kSlackVoxels;
         const auto count = std::size_t(points.count());
@@ -78,6 +81,10 @@ class PointChecker::Tile {
     std::size_t offset(const Vec3i& p) const {
         const Vec3i n = points_.size(), q = p - points_.min;
         return (std::size_t(q.z) * std::size_t(n.y) + std::size_t(q.y)) * std::size_t(n.x) + std::size_t(q.x);
+    }
+
+    PointRule rule(const Vec3i& p) const {
+        return rules_.empty() ? PointRule::sample : rules_[blocks_[0].offset(p)];
     }
 
     template <class Visit>
@@ -139,6 +146,7 @@ class PointChecker::Tile {
             if (distance > bounds_[a].spillVoxels + kSlackVoxels || !blocks_[a].covered(p)) continue;
             const std::size_t pair = at * blocks_.size() + a;
             isNear_[pair] = 1;
+            if (rule(p) != PointRule::sample) continue;
             share_[pair] = std::min(share_[pair], shareOfAllowed(index, element, w, p, a));
         }
     }
@@ -156,14 +164,24 @@ class PointChecker::Tile {
                 if (!std::isnan(value)) return kNone;
                 continue;
             }
+            if (std::isnan(value) && bounds_[a].wholeVectors && !line.isVectorFinite) continue;
             const double exact = line.at(w);
-            const double error =
+            double error =
                 formatError(bounds_[a].format, checker_.channels_[c].range, line.largest, line.highest);
             // A float stays in the range of the element's values; what is kept in steps may leave it by as
             // much.
-            const double step = bounds_[a].format == SampleFormat::r32f ? 0 : error;
+            double step = bounds_[a].format == SampleFormat::r32f ? 0 : error;
+            if (!bounds_[a].isHalf.empty() && bounds_[a].isHalf[c]) {
+                const double half = std::max(kHalfUlp * std::abs(value), kSmallestHalf);
+                error += half;
+                step += half;
+            }
             if (!(value >= line.low - step && value <= line.high + step)) return kNone;
-            if (line.low == line.high) continue;
+            if (line.low == line.high) {
+                if (step == 0) continue;
+                worst = std::max(worst, std::abs(value - line.low) / step);
+                continue;
+            }
             if (!element.isReliable()) {
                 worst = kUndecided;
                 continue;
@@ -202,10 +220,20 @@ class PointChecker::Tile {
             line.gradient = glm::length(gradient);
             line.rounding = spread * element.weightError;
         }
+        for (std::size_t c = 0; c < lines_.size(); ++c) {
+            const Channel& channel = checker_.channels_[c];
+            if (channel.field->components != 3 || lines_[c].isFinite) continue;
+            for (std::size_t k = 0; k < 3; ++k)
+                lines_[c - std::size_t(channel.component) + k].isVectorFinite = false;
+        }
     }
 
     void judge(const Vec3i& p, std::size_t at, std::size_t a, PointCheck& check) const {
         const std::size_t pair = at * blocks_.size() + a;
+        if (rule(p) == PointRule::absent) {
+            if (blocks_[a].covered(p)) note(check, check.spills, p, "is stored, though nothing needs it");
+            return;
+        }
         if (!blocks_[a].covered(p)) {
             if (isInside_[at]) note(check, check.holes, p, "lies in the mesh and is not covered");
             return;
@@ -213,6 +241,8 @@ class PointChecker::Tile {
         ++check.covered;
         if (!isNear_[pair]) {
             note(check, check.spills, p, "is covered and lies outside the mesh");
+        } else if (rule(p) != PointRule::sample) {
+            return;
         } else if (share_[pair] > 1) {
             note(check, check.wrongValues, p, "has a value that no element there explains");
         } else if (share_[pair] == kUndecided) {
@@ -233,6 +263,7 @@ class PointChecker::Tile {
     const PointChecker& checker_;
     std::span<const Block> blocks_;
     std::span<const SampleBounds> bounds_;
+    std::span<const PointRule> rules_;
     IndexBox points_;
     double reach_ = 0;
     std::vector<float> thinnest_;
@@ -255,7 +286,7 @@ PointChecker::PointChecker(const TetMesh& mesh, const VoxelMesh& voxels, std::sp
 
 void PointChecker::check(std::span<const Block> blocks, std::span<const SampleBounds> bounds,
                          std::span<PointCheck> checks, std::vector<float>& thinnestVoxels,
-                         const Execution& execution) const {
+                         const Execution& execution, std::span<const PointRule> rules) const {
     TESSERA_CHECK(blocks.size() == bounds.size() && blocks.size() == checks.size(),
                   "every block has its bounds and its check");
     thinnestVoxels.clear();
@@ -273,7 +304,7 @@ void PointChecker::check(std::span<const Block> blocks, std::span<const SampleBo
                 tiles.push_back({{x, y, z}, glm::min(Vec3i(x, y, z) + kTileEdge, box.max)});
     std::vector<std::vector<PointCheck>> results(tiles.size(), std::vector<PointCheck>(blocks.size()));
     parallelFor(execution, std::int64_t(tiles.size()), [&](std::int64_t t) {
-        Tile tile(*this, blocks, bounds, tiles[std::size_t(t)]);
+        Tile tile(*this, blocks, bounds, rules, tiles[std::size_t(t)]);
         tile.run();
         tile.finish(results[std::size_t(t)], thinnestVoxels);
     });

@@ -5,9 +5,9 @@
 #include <limits>
 #include <vector>
 
+#include "brick/seams.h"
 #include "lattice/lattice.h"
 #include "mesh/element_index.h"
-#include "mesh/nearest_point.h"
 #include "mesh/tet_mesh.h"
 
 namespace tessera {
@@ -59,7 +59,7 @@ class VoxelMesh {
     TetMesh voxels_;                   // the elements with nodes in voxel units
     std::vector<std::uint8_t> solid_;  // by element: its exact volume isn't zero
     ElementIndex index_;
-    NearestPointIndex boundary_;
+    NearestOnDemand boundary_;
 };
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-#include "compare/voxel_mesh.h"
+#include "verify/voxel_mesh.h"
 
 #include <algorithm>
 #include <cmath>
@@ -130,7 +130,7 @@ Box3d VoxelMesh::bounds(std::int32_t index) const {
 }
 
 bool VoxelMesh::isNearBoundary(const Vec3d& place, double reach) const {
-    if (boundary_.find(place, reach).element < 0) return false;
+    if (boundary_.get().find(place, reach).element < 0) return false;
     std::vector<std::int32_t> candidates;
     query({place - reach, place + reach}, candidates);
     std::vector<VoxelElement> elements;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/execution.h"
-#include "compare/voxel_mesh.h"
+#include "verify/voxel_mesh.h"
 #include "lattice/block.h"
 #include "resample/resampler.h"
 
@@ -17,6 +17,15 @@ struct SampleBounds {
     double spillVoxels = 0;  ///< Resampler::spillBoundVoxels()
     double placeVoxels = 0;  ///< Resampler::placeBoundVoxels()
     SampleFormat format = SampleFormat::r32f;
+    std::vector<std::uint8_t> isHalf;  ///< by channel: values were rounded to half floats; empty: none
+    bool wholeVectors = false;  ///< a component that isn't finite takes the other two of a vector with it
+};
+
+/// What is expected of a lattice point.
+enum class PointRule : std::uint8_t {
+    sample,    ///< coverage as the mesh's, and values that an element there explains
+    coverage,  ///< coverage alone
+    absent,    ///< no coverage: it isn't stored
 };
 
 /// How samples measure against clauses 1 to 4 of the contract. Counts are of lattice points.
@@ -49,9 +58,10 @@ class PointChecker {
     /// Checks blocks of one box, each of another algorithm, and adds to checks[i] what block i gives.
     /// @param thinnestVoxels by offset in the box: the least thickness of the elements that a point lies in
     /// or near, infinite where there is none.
+    /// @param rules by offset in the box; empty: all are samples.
     void check(std::span<const Block> blocks, std::span<const SampleBounds> bounds,
-               std::span<PointCheck> checks, std::vector<float>& thinnestVoxels,
-               const Execution& execution) const;
+               std::span<PointCheck> checks, std::vector<float>& thinnestVoxels, const Execution& execution,
+               std::span<const PointRule> rules = {}) const;
 
   private:
     struct Channel {

@@ -1,0 +1,217 @@
+#include "io/outside_reader.h"
+
+#include <openvdb/io/File.h>
+#include <openvdb/tools/Interpolation.h>
+
+#include <cmath>
+#include <mutex>
+
+#include "base/error.h"
+#include "brick/error_samples.h"
+#include "brick/leaf_tiles.h"
+#include "io/openvdb_grids.h"
+#include "io/vdb_metadata.h"
+
+namespace tessera {
+namespace {
+
+constexpr std::int64_t kChunk = 4096;
+constexpr double kOnPlane = 0x1p-20;  // voxels: what rounding in the transform may move a place by
+
+openvdb::Vec3d filePlace(const VdbFile& file, const Vec3d& world) {
+    const Vec3d p = world * file.unitScale;
+    if (file.upAxis == UpAxis::y) return {p.x, p.z, -p.y};
+    if (file.upAxis == UpAxis::z) return {p.x, -p.z, p.y};
+    return {p.x, p.y, p.z};
+}
+
+openvdb::Vec3f turnedBack(const openvdb::Vec3f& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return {v.x(), -v.z(), v.y()};
+    if (upAxis == UpAxis::z) return {v.x(), v.z(), -v.y()};
+    return v;
+}
+
+// Whether the eight voxels around an index are active, but for those without weight.
+template <class Accessor>
+bool isComplete(const Accessor& accessor, const openvdb::Vec3d& index) {
+    openvdb::Vec3d base;
+    openvdb::Vec3d fraction;
+    for (int a = 0; a < 3; ++a) {
+        const double whole = std::round(index[a]);
+        base[a] = std::abs(index[a] - whole) < kOnPlane ? whole : std::floor(index[a]);
+        fraction[a] = std::max(0.0, index[a] - base[a]);
+        if (fraction[a] < kOnPlane) fraction[a] = 0;
+    }
+    for (int c = 0; c < 8; ++c) {
+        if (((c & 1) && fraction[0] == 0) || ((c & 2) && fraction[1] == 0) || ((c & 4) && fraction[2] == 0))
+            continue;
+        const openvdb::Coord at(int(base[0]) + (c & 1), int(base[1]) + (c >> 1 & 1), int(base[2]) + (c >> 2));
+        if (!accessor.isValueOn(at)) return false;
+    }
+    return true;
+}
+
+class OutsideReader {
+  public:
+    OutsideReader(const std::string& path, const VdbFile& file, const TetMesh& mesh,
+                  std::span<const int> fields, const Execution& execution)
+        : path_(path), file_(file), samples_(mesh, fields, execution), execution_(execution) {}
+
+    OutsideReading run() {
+        findPlaces();
+        OutsideReading reading;
+        for (const std::int32_t level : level_) reading.places += level >= 0;
+        openvdb::initialize();
+        openvdb::io::File source(path_);
+        source.open(/*delayLoad=*/false);
+        std::size_t f = 0;
+        for (const OutputField& field : file_.fields) {
+            squares_.assign(level_.size(), 0.0);
+            for (const GridPlan& plan : planGrids({field})) {
+                for (int level = 0; level < file_.tree.levelCount(); ++level) {
+                    const std::string name = gridName(plan.name, file_.layout, level);
+                    if (!source.hasGrid(name)) continue;
+                    const openvdb::GridBase::Ptr grid = source.readGrid(name);
+                    if (plan.components == 3)
+                        read(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid), f, plan, level, reading);
+                    else
+                        read(*openvdb::gridPtrCast<openvdb::FloatGrid>(grid), f, plan, level, reading);
+                }
+            }
+            double largest = 0;
+            for (const double square : squares_) largest = std::max(largest, square);
+            reading.max.push_back(std::sqrt(largest));
+            ++f;
+        }
+        return reading;
+    }
+
+  private:
+    void findPlaces() {
+        const ErrorSamples exact(samples_.mesh(), {}, execution_);
+        const BrickTree& tree = file_.tree;
+        std::vector<std::uint8_t> coarserNear(tree.leafCount());
+        for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf)
+            coarserNear[leaf] = hasCoarserNeighbour(tree, leaf);
+        level_.assign(samples_.count(), -1);
+        parallelForChunks(execution_, std::int64_t(samples_.count()), kChunk,
+                          [&](std::int64_t begin, std::int64_t end) {
+                              for (std::int64_t i = begin; i < end; ++i)
+                                  if (exact.exists(std::size_t(i)))
+                                      level_[std::size_t(i)] = levelOf(std::size_t(i), coarserNear);
+                          });
+    }
+
+    std::int32_t levelOf(std::size_t sample, const std::vector<std::uint8_t>& coarserNear) const {
+        const BrickTree& tree = file_.tree;
+        if (file_.boundsWorld && !contains(*file_.boundsWorld, samples_.placeWorld(sample, Vec3d(0))))
+            return -1;
+        const Vec3d index0 = samples_.placeWorld(sample, tree.originWorld()) / tree.spacingWorld();
+        const std::int32_t leaf = leafOfPlace(tree, index0);
+        if (leaf < 0) return file_.layout == VdbLayout::flat ? 0 : -1;
+        if (file_.layout == VdbLayout::flat) return 0;
+        const BrickKey& key = tree.leaves()[std::size_t(leaf)];
+        const Vec3d index = index0 * std::ldexp(1.0, -key.level);
+        const CellPlace place =
+            locateInBrick(index - Vec3d(key.index * tree.brickCells()), tree.brickCells());
+        const int low = coarserNear[std::size_t(leaf)] ? 1 : 0;
+        for (int a = 0; a < 3; ++a)
+            if (place.cell[a] < low || place.cell[a] + 1 >= tree.brickCells()) return -1;
+        if (file_.layers > 0) return key.level;
+        // Without an extension a place is read where all eight voxels are samples.
+        for (int c = 0; c < 8; ++c) {
+            bool covered = false;
+            file_.store.value(std::size_t(leaf), place.cell + cornerOffset(c), 0, covered);
+            if (!covered && cornerWeight(place.fraction, c) > 0) return -1;
+        }
+        return key.level;
+    }
+
+    // Whether the voxels around are inactive because their values aren't finite.
+    bool isNotFinite(std::size_t sample, int level, const GridPlan& plan) const {
+        const BrickTree& tree = file_.tree;
+        const Vec3d index = samples_.placeWorld(sample, tree.originWorld()) / tree.spacingWorld(level);
+        for (int c = 0; c < 8; ++c) {
+            const Vec3i p = Vec3i(glm::floor(index + kOnPlane)) + cornerOffset(c);
+            const std::int64_t leaf = tree.findLeafAt(level, p);
+            for (int k = plan.firstChannel; k < plan.firstChannel + plan.components; ++k) {
+                bool covered = false;
+                float value = 0;
+                if (leaf >= 0 && tree.leaves()[std::size_t(leaf)].level == level)
+                    value = file_.store.value(std::size_t(leaf),
+                                              p - tree.ownedPoints(tree.leaves()[std::size_t(leaf)]).min, k,
+                                              covered);
+                if (const Tile* tile = file_.store.extensionAt(level, p); !covered && tile)
+                    value = tile->channel(k)[offsetInTile(p)];
+                if (!std::isfinite(value)) return true;
+            }
+        }
+        return false;
+    }
+
+    template <class Grid>
+    void read(const Grid& grid, std::size_t f, const GridPlan& plan, int level, OutsideReading& reading) {
+        std::mutex mutex;
+        const SampledField& field = samples_.fields()[f];
+        const double shift = file_.voxelShift * file_.tree.spacingWorld(level);
+        parallelForChunks(
+            execution_, std::int64_t(level_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+                const auto accessor = grid.getConstAccessor();
+                for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
+                    if (level_[i] != level || (field.isCell() && i < samples_.nodeCount())) continue;
+                    const Vec3d world = samples_.placeWorld(i, Vec3d(0)) + shift;
+                    const openvdb::Vec3d index = grid.transform().worldToIndex(filePlace(file_, world));
+                    if (!isComplete(accessor, index)) {
+                        if (isNotFinite(i, level, plan) || squares_[i] < 0) {
+                            squares_[i] = -1;
+                            continue;
+                        }
+                        const std::lock_guard lock(mutex);
+                        ++reading.incomplete;
+                        if (reading.firstProblem.empty())
+                            reading.firstProblem = "the place (" + exactText(world.x) + ", " +
+                                                   exactText(world.y) + ", " + exactText(world.z) +
+                                                   ") lacks voxels around it in grid " + grid.getName();
+                        continue;
+                    }
+                    typename Grid::ValueType value;
+                    openvdb::tools::BoxSampler::sample(accessor, index, value);
+                    add(i, field, plan, value);
+                }
+            });
+    }
+
+    void add(std::size_t i, const SampledField& field, const GridPlan& plan, float value) {
+        const int c =
+            plan.firstChannel - file_.fields[std::size_t(&field - samples_.fields().data())].firstChannel;
+        addComponent(i, field, c, double(value));
+    }
+    void add(std::size_t i, const SampledField& field, const GridPlan&, const openvdb::Vec3f& value) {
+        const openvdb::Vec3f v = turnedBack(value, file_.upAxis);
+        for (int c = 0; c < 3; ++c) addComponent(i, field, c, double(v[c]));
+    }
+    void addComponent(std::size_t i, const SampledField& field, int component, double value) {
+        if (squares_[i] < 0) return;
+        const double difference = value - samples_.exactValue(i, *field.field, component);
+        if (std::isfinite(difference))
+            squares_[i] += difference * difference;
+        else
+            squares_[i] = -1;
+    }
+
+    const std::string& path_;
+    const VdbFile& file_;
+    SampledMesh samples_;
+    const Execution& execution_;
+    std::vector<std::int32_t> level_;  // by sample: the level whose grid it is read from, or -1
+    std::vector<double> squares_;      // by sample: of the differences of one field; below 0 where not finite
+};
+
+}  // namespace
+
+OutsideReading readAsOutsider(const std::string& path, const VdbFile& file, const TetMesh& mesh,
+                              std::span<const int> fields, const Execution& execution) {
+    return OutsideReader(path, file, mesh, fields, execution).run();
+}
+
+}  // namespace tessera
