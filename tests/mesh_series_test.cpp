@@ -294,7 +294,7 @@ TEST_F(Parts, NodesOfOnePartStayApart) {
     EXPECT_TRUE(file.statistics.warnings.empty());
     for (const auto& tet : file.mesh.tets)
         for (const std::int32_t node : tet)
-            EXPECT_EQ(file.mesh.fields[0].at(node), file.mesh.points[std::size_t(tet[3])].z > 0 ? 1 : 2);
+            EXPECT_EQ(file.mesh.fields[0].at(node, 0), file.mesh.points[std::size_t(tet[3])].z > 0 ? 1 : 2);
 }
 
 TEST_F(Parts, FieldsThatSomeLackAreNanThereAndNamed) {

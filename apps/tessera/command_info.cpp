@@ -141,7 +141,8 @@ Json showSeries(const InfoArguments& arguments, const std::vector<SeriesStep>& s
         documents.push_back(std::move(document));
     }
     for (const std::string& note : summary.notes()) notes.push_back(note);
-    std::string text = formatTable(rows) + fieldsText(summary.fields());
+    std::string text =
+        fmt::format("series of {} steps\n", steps.size()) + formatTable(rows) + fieldsText(summary.fields());
     for (const std::string& note : notes) text += "  " + note + "\n";
     session.print(text);
     Json json = documentHead(arguments.paths);
