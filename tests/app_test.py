@@ -790,6 +790,141 @@ class Series(AppTest):
                 self.assertEqual(lattices[0], lattices[1])
                 self.assertEqual(lattices[0], lattices[2])
 
+    COARSE = ("--refine", "uniform", "--resolution", "20", "--quiet")
+
+    def write_collection(self, name, *entries):
+        text = "".join(f"<DataSet {entry}/>" for entry in entries)
+        return self.write(name, f'<?xml version="1.0"?><VTKFile type="Collection"><Collection>{text}</Collection></VTKFile>')
+
+    def write_halves(self):
+        """A cube at two times, whole and in two parts that have the cells of each other as ghosts."""
+        for part in range(2):
+            ghosts = " ".join(str(int((i < 3) != (part == 0))) for i in range(6))
+            array = f'<CellData><DataArray type="UInt8" Name="vtkGhostType" format="ascii">{ghosts}</DataArray></CellData>'
+            for step in range(2):
+                text = vtu_text(fields={"f": [step + p[0] for p in CUBE_POINTS]})
+                self.write(f"half_{step}_{part}.vtu", text.replace("</PointData>", "</PointData>" + array))
+        for step in range(2):
+            self.write(f"whole_{step}.vtu", vtu_text(fields={"f": [step + p[0] for p in CUBE_POINTS]}))
+        self.write_collection("halves.pvd", *(f'timestep="{(0.1, 2.5)[s]}" part="{p}" file="half_{s}_{p}.vtu"' for s in (0, 1) for p in (0, 1)))
+
+    def test_parts_of_a_step_are_one_mesh(self):
+        self.write_halves()
+        self.succeed("resample", "halves.pvd", "-o", "half_%d.vdb", "--json", "halves.json", *self.COARSE)
+        self.succeed("resample", "whole_0.vtu", "whole_1.vtu", "-o", "whole_%d.vdb", "--json", "wholes.json", *self.COARSE)
+        halves, wholes = (json.loads((self.folder / name).read_text()) for name in ("halves.json", "wholes.json"))
+        self.assertEqual(len(halves["steps"]), 2)
+        for half, whole in zip(halves["steps"], wholes["steps"]):
+            self.assertEqual(half["voxels"], whole["voxels"])
+            self.assertEqual(half["mesh"]["blanked_cells"], 6)
+            for key in ("cells", "elements", "nodes", "boundary_faces", "non_conforming_faces", "bounds", "fields"):
+                self.assertEqual(half["mesh"][key], whole["mesh"][key], key)
+        self.assertEqual(halves["steps"][1]["files"], ["half_1_0.vtu", "half_1_1.vtu"])
+        self.assertEqual(self.report("info", "half_1.vdb")["source"], "halves.pvd")
+        self.assertIn("claims hold", self.succeed("verify", "halves.pvd", "half_0.vdb", "--time-step", "0"))
+        self.assertEqual(self.report("info", "halves.pvd", "--time-step", "1")["mesh"]["fields"][0]["ranges"], [[1, 2]])
+        self.reject(2, "halves.pvd 2", "info", "halves.pvd", "--time-step", "2")
+        self.reject(2, "would replace", "tets", "halves.pvd", "-o", "half_0_1.vtu")
+
+    def test_both_readers_and_any_threads_join_parts_alike(self):
+        self.write_halves()
+        files = []
+        for i, options in enumerate((["--threads", "1"], ["--threads", "3"], ["--reader", "in-process"])):
+            self.succeed("resample", "halves.pvd", "-o", f"out{i}_#.vdb", *options, *self.COARSE)
+            files.append((self.folder / f"out{i}_1.vdb").read_bytes())
+        self.assertEqual(files[0], files[1])
+        self.assertEqual(files[0], files[2])
+
+    def test_times_go_into_files_and_reports(self):
+        self.write_collection("t.pvd", 'timestep="1e-1" file="run_0.vtu"', 'timestep="0.30000000000000004" file="run_1.vtu"')
+        report = self.report("resample", "t.pvd", "-o", "t_%03d.vdb", *self.COARSE[:-1])
+        times = [0.1, 0.30000000000000004]
+        self.assertEqual(report["series"]["times"], times)
+        self.assertEqual([step["time"] for step in report["steps"]], times)
+        self.assertEqual([step["step"] for step in report["steps"]], [0, 1])
+        for step in range(2):
+            self.assertEqual(self.report("info", f"t_{step:03}.vdb")["time"], times[step])
+        self.assertIn("time 0.30000000000000004", self.succeed("info", "t_001.vdb"))
+        self.assertIn(b"tessera_time", (self.folder / "t_000.vdb").read_bytes())
+        self.succeed("resample", "run_0.vtu", "-o", "plain.vdb", *self.COARSE)
+        self.assertNotIn(b"tessera_time", (self.folder / "plain.vdb").read_bytes())
+        self.assertNotIn("time", self.report("info", "plain.vdb"))
+
+    def test_times_choose_steps_which_keep_their_numbers(self):
+        report = self.report("resample", "all.pvd", "-o", "out_%d.vdb", "--times", "1:", *self.COARSE[:-1])
+        self.assertEqual([step["time"] for step in report["steps"]], [1, 2])
+        self.assertEqual(sorted(p.name for p in self.folder.glob("out_*")), ["out_1.vdb", "out_2.vdb"])
+        self.assertEqual(self.report("resample", "all.pvd", "-o", "one.vdb", "--times", "1:1.5", *self.COARSE[:-1])["time"], 1)
+        self.reject(2, "--times 'x:1'", "resample", "all.pvd", "--dry-run", "--times", "x:1")
+        for times in (":", "1", "", "2:1", "1:2:3", "nan:"):
+            self.reject(2, "--times", "resample", "all.pvd", "--dry-run", f"--times={times}")
+        self.reject(2, "all.pvd 0 2", "resample", "all.pvd", "--dry-run", "--times", "5:6")
+        self.reject(2, "run_0.vtu .pvd", "resample", "run_*.vtu", "--dry-run", "--times", "0:1")
+
+    def test_names_that_a_shell_expanded_are_in_natural_order(self):
+        for number in (10, 2, 1):
+            self.write(f"step_{number}.vtu", vtu_text(fields={"f": [number * p[0] for p in CUBE_POINTS]}))
+        names = ["step_1.vtu", "step_10.vtu", "step_2.vtu"]
+        report = self.report("resample", *names, "-o", "out_####.vdb", *self.COARSE[:-1])
+        self.assertEqual([step["input"] for step in report["steps"]], ["step_1.vtu", "step_2.vtu", "step_10.vtu"])
+        self.assertEqual(self.report("info", "out_0002.vdb")["source"], "step_10.vtu")
+        self.reject(2, "step_1.vtu twice", "resample", *names, "./step_1.vtu", "-o", "x_####.vdb")
+        self.reject(2, "all.pvd", "resample", "all.pvd", "step_1.vtu", "-o", "x_####.vdb")
+
+    def test_output_names(self):
+        for pattern, name in {"a%04d.vdb": "a0001.vdb", "b%d.vdb": "b1.vdb", "c%3d.vdb": "c  1.vdb", "d%02d%%.vdb": "d01%.vdb", "e#_##.vdb": "e#_01.vdb", "f#%d.vdb": "f#1.vdb"}.items():  # fmt: skip
+            with self.subTest(pattern=pattern):
+                self.succeed("resample", "run_0.vtu", "run_1.vtu", "-o", pattern, *self.COARSE)
+                self.assertTrue((self.folder / name).exists(), sorted(os.listdir(self.folder)))
+        for pattern in ("%s.vdb", "%.vdb", "a%", "%-4d.vdb", "%004d.vdb", "%x.vdb", "%4%.vdb"):
+            with self.subTest(pattern=pattern):
+                self.reject(2, "%04d", "resample", "run_0.vtu", "run_1.vtu", "-o", pattern, *self.COARSE)
+        for pattern in ("same.vdb", "same%%.vdb"):
+            self.reject(2, "#### %04d", "resample", "run_0.vtu", "run_1.vtu", "-o", pattern, *self.COARSE)
+
+    def test_info_shows_the_steps_and_the_ranges_over_all(self):
+        for inputs in (["all.pvd"], ["run_*.vtu"], ["run_0.vtu", "run_2.vtu", "run_1.vtu"]):
+            report = self.report("info", *inputs)
+            self.assertEqual(report["series"]["fields"][0]["ranges"], [[0, 18]])
+            self.assertEqual(report["series"]["bounds"], [[0, 0, 0], [3, 1, 1]])
+            self.assertEqual([step["mesh"]["elements"] for step in report["steps"]], [6, 6, 6])
+            self.assertEqual([step["input"].rsplit("/")[-1] for step in report["steps"]], [f"run_{s}.vtu" for s in range(3)])
+        self.assertEqual(self.report("info", "all.pvd")["series"]["times"], [0, 1, 2])
+        text = self.succeed("info", "all.pvd")
+        self.assertRegex(text, r"step +time +cells +elements +nodes +files\n +0 +0 +6 +6 +8 +run_0.vtu\n")
+        self.assertRegex(text, r"f +points +1 +0 .. 18")
+        self.write("run_3.vtu", vtu_text(fields={"g": [0] * 8}))
+        self.assertIn("field 'f' is in 3 of 4 steps only", self.succeed("info", "run_*.vtu"))
+        self.reject(2, "vdb", "info", "a.vdb", "b.vdb")
+        self.reject(2, "--repair", "info", "all.pvd", "--repair")
+        self.reject(2, "would replace", "info", "all.pvd", "--json", "run_1.vtu")
+
+    def test_collections_that_go_wrong(self):
+        self.write("empty.vtu", "")
+        self.write("grid.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n")
+        cases = {
+            "bad.pvd byte gone.vtu": ['timestep="0" file="gone.vtu"'],
+            "bad.pvd byte gone.vtu exist": ['timestep="0" part="0" file="run_0.vtu"', 'timestep="0" part="1" file="gone.vtu"'],
+            "bad.pvd byte 'soon' number": ['timestep="soon" file="run_0.vtu"'],
+            "bad.pvd byte .pvd": ['timestep="0" file="bad.pvd"'],
+            "all.pvd byte .pvd": ['timestep="0" file="all.pvd"'],
+            "bad.pvd byte /dev/zero regular": ['timestep="0" file="/dev/zero"'],
+            "bad.pvd byte part twice": ['timestep="0" part="0" file="run_0.vtu"', 'timestep="0" part="0" file="run_1.vtu"'],
+            "grid.vtk kind run_0.vtu": ['timestep="0" part="0" file="run_0.vtu"', 'timestep="0" part="1" file="grid.vtk"'],
+            "empty.vtu empty": ['timestep="0" part="0" file="run_0.vtu"', 'timestep="0" part="1" file="empty.vtu"'],
+            "bad.pvd no files": [],
+        }
+        for words, entries in cases.items():
+            with self.subTest(words=words):
+                self.write_collection("bad.pvd", *entries)
+                self.reject(2, words, "resample", "bad.pvd", "-o", "out_####.vdb")
+                self.reject(2, words, "info", "bad.pvd")
+        os.symlink("/dev/zero", self.folder / "zero.pvd")
+        os.mkfifo(self.folder / "pipe.pvd")
+        for name in ("zero.pvd", "pipe.pvd"):
+            self.reject(2, f"{name} regular", "resample", name, "-o", "out_####.vdb")
+            self.reject(2, f"{name} regular", "info", name)
+
 
 class Compare(AppTest):
     def test_two_code_paths_agree(self):

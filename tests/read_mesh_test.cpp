@@ -548,34 +548,5 @@ TEST(WriteTets, ReadsBackBitForBit) {
     EXPECT_FALSE(std::filesystem::exists(folder.file("absent")));
 }
 
-TEST(ListSeries, SortsNumbersByValue) {
-    const TemporaryFolder folder;
-    for (const char* name : {"run_10.vtu", "run_2.vtu", "run_1.vtu", "run_007.vtu", "other.txt"})
-        folder.write(name, "x");
-    const std::vector<std::string> expected{folder.file("run_1.vtu"), folder.file("run_2.vtu"),
-                                            folder.file("run_007.vtu"), folder.file("run_10.vtu")};
-    EXPECT_EQ(listSeries(folder.file("run_*.vtu")), expected);
-    EXPECT_EQ(listSeries(folder.file("run_?.vtu")).size(), 2u);
-    EXPECT_EQ(listSeries(folder.file("other.txt")), std::vector<std::string>{folder.file("other.txt")});
-    EXPECT_THROW(listSeries(folder.file("none_*.vtu")), InputError);
-    EXPECT_THROW(listSeries(folder.file("none.vtu")), InputError);
-}
-
-TEST(ListSeries, FollowsACollectionByTime) {
-    const TemporaryFolder folder;
-    folder.write("a & b.vtu", "x");
-    folder.write("c.vtu", "x");
-    const std::string path =
-        folder.write("s.pvd",
-                     "<?xml version=\"1.0\"?><VTKFile type=\"Collection\" version=\"0.1\"><Collection>\n"
-                     "<DataSet timestep=\"2.5\" part=\"0\" file=\"a &amp; b.vtu\"/>\n<DataSet "
-                     "timestep='1e-1' file='c.vtu'/></Collection></VTKFile>");
-    EXPECT_EQ(listSeries(path), (std::vector<std::string>{folder.file("c.vtu"), folder.file("a & b.vtu")}));
-    folder.write(
-        "bad.pvd",
-        "<VTKFile type=\"Collection\"><Collection><DataSet file=\"gone.vtu\"/></Collection></VTKFile>");
-    EXPECT_THROW(listSeries(folder.file("bad.pvd")), InputError);
-}
-
 }  // namespace
 }  // namespace tessera

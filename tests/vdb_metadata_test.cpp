@@ -15,6 +15,7 @@ VdbMetadata someMetadata() {
     metadata.tree = BrickTree({0.1, -2, 3e5}, 0.25, 16, {{0, {2, 0, -1}}, {1, {0, 0, -1}}, {3, {-7, 5, 0}}});
     metadata.boundsWorld = Box3d{{0, 0, 0}, {1, 2, 3}};
     metadata.report.nodes = 80;
+    metadata.time = 0.1;
     return metadata;
 }
 
@@ -46,6 +47,12 @@ TEST(VdbMetadata, ComesBack) {
     EXPECT_EQ(read.tree.leaves()[2], (BrickKey{3, {-7, 5, 0}}));
     EXPECT_EQ(read.fields[1].firstChannel, 1);
     EXPECT_EQ(read.report.nodes, 80);
+    EXPECT_EQ(entries.at("tessera_time"), "0.1");
+    EXPECT_EQ(read.time, 0.1);
+    VdbMetadata timeless = someMetadata();
+    timeless.time.reset();
+    EXPECT_FALSE(encodeMetadata(timeless).contains("tessera_time"));
+    EXPECT_FALSE(decodeMetadata(encodeMetadata(timeless)).time);
 }
 
 TEST(VdbMetadata, NumbersThatDoNotFitAreRefused) {
@@ -62,6 +69,8 @@ TEST(VdbMetadata, NumbersThatDoNotFitAreRefused) {
     expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":1e300", "nodes");
     expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":9223372036854775808", "nodes");
     expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":80.5", "nodes");
+    for (const char* number : {"soon", "inf", "", "0.1 s"})
+        expectRefused("tessera_time", "0.1", number, "tessera_time");
 }
 
 TEST(VdbMetadata, DeepNestingIsRefused) {

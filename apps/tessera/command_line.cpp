@@ -29,8 +29,10 @@ CLI::Validator numbersWithin(double first, double last) {
 
 CLI::Option* addTimeStep(CLI::App& command, int& step) {
     return command
-        .add_option("--time-step", step,
-                    "files with several steps: which one, counted from 0 (default: the last)")
+        .add_option(
+            "--time-step", step,
+            "files with several steps, .pvd files among them: which one, counted from 0 (default: the "
+            "last)")
         ->check(CLI::Range(0, std::numeric_limits<int>::max()));
 }
 
@@ -228,10 +230,18 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
 }
 
 void addResampleOptions(CLI::App& command, ResampleArguments& a) {
-    command.add_option("mesh", a.input, "mesh file, a pattern such as 'run_*.vtu', or a .pvd file")
+    command
+        .add_option(
+            "mesh", a.inputs,
+            "a mesh file, or the steps of a series: mesh files and patterns such as 'run_*.vtu', taken in "
+            "the order of the numbers in their names (run_2 before run_10), or one .pvd file")
         ->required();
-    command.add_option("-o,--output", a.output,
-                       "the .vdb file; #### stands for the step's number in a series");
+    command.add_option(
+        "-o,--output", a.output,
+        "the .vdb file; #### or %04d stands for the step's number in a series, %% for a percent "
+        "sign");
+    command.add_option("--times", a.times,
+                       "only the steps of a .pvd file with times from a to b, both included: a:b, a: or :b");
     addRefineOptions(command, a);
     addOutputOptions(command, a);
     addAlgorithmOptions(command, a.algorithm);
@@ -242,17 +252,21 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
   tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
   tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
   tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
-  tessera resample 'run_*.vtu' -o 'out_####.vdb' --json report.json)");
+  tessera resample run_*.vtu -o out_%04d.vdb --json report.json
+  tessera resample run.pvd -o 'out_####.vdb' --times 0.5:2)");
 }
 
 void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
-    command.add_option("file", arguments.path, "mesh file, or .vdb file that tessera wrote");
+    command.add_option("file", arguments.paths,
+                       "a mesh file, a .vdb file that tessera wrote, or a series as resample takes it: mesh "
+                       "files, patterns, or one .pvd file");
     command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
     addTimeStep(command, arguments.timeStep);
     addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
     command.footer(
-        "Examples:\n  tessera info mesh.vtu\n  tessera info out.vdb --json -\n  tessera info --gl");
+        "Examples:\n  tessera info mesh.vtu\n  tessera info run.pvd\n  tessera info out.vdb --json -\n"
+        "  tessera info --gl");
 }
 
 void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {

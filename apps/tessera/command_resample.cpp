@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "base/error.h"
@@ -16,41 +15,39 @@
 #include "predict_cost.h"
 #include "registry/registry.h"
 #include "report_text.h"
+#include "series_steps.h"
 
 namespace tessera {
 
 namespace {
 
-/// One mesh file of a run and the file it becomes.
+/// One mesh of a run and the file it becomes.
 struct Step {
-    std::string input, output;
+    SeriesStep source;
+    std::string input;  ///< what messages call the mesh
+    std::string output;
 };
 
-std::string numberedName(const std::string& pattern, std::size_t number) {
-    const std::size_t begin = pattern.find('#');
-    if (begin == std::string::npos) return pattern;
-    const std::size_t end = std::min(pattern.find_first_not_of('#', begin), pattern.size());
-    return fmt::format("{}{:0{}}{}", pattern.substr(0, begin), number, end - begin, pattern.substr(end));
-}
-
 std::vector<Step> listSteps(const ResampleArguments& arguments) {
-    const std::vector<std::string> inputs = listSeries(arguments.input);
-    if (inputs.size() > 1 && !arguments.output.empty() && arguments.output.find('#') == std::string::npos)
-        throw InputError(
-            fmt::format("{} names {} files: the output needs #### for the step's number, got '{}'",
-                        arguments.input, inputs.size(), arguments.output));
+    std::vector<SeriesStep> sources = listSeries(arguments.inputs);
+    if (!arguments.times.empty()) sources = stepsWithin(sources, parseTimes(arguments.times));
+    if (sources.size() > 1 && !arguments.output.empty() && !takesNumber(arguments.output))
+        throw InputError(fmt::format(
+            "{} steps need as many outputs: the output needs #### or %04d for the step's number, got '{}'",
+            sources.size(), arguments.output));
     std::vector<Step> steps;
-    for (std::size_t i = 0; i < inputs.size(); ++i)
-        steps.push_back({inputs[i], numberedName(arguments.output, i)});
+    for (const SeriesStep& source : sources)
+        steps.push_back({source, nameOf(source), numberedName(arguments.output, source.number)});
     return steps;
 }
 
 void checkOutputs(const std::vector<Step>& steps, const ResampleArguments& arguments) {
     const std::string& json = arguments.common.jsonPath;
-    std::vector<std::string> inputs{arguments.input, arguments.like};
+    std::vector<std::string> inputs = arguments.inputs;
+    inputs.push_back(arguments.like);
     std::vector<OutputPath> outputs;
     for (const Step& step : steps) {
-        inputs.push_back(step.input);
+        inputs.insert(inputs.end(), step.source.files.begin(), step.source.files.end());
         if (!arguments.dryRun) outputs.push_back({"--output", step.output});
     }
     outputs.push_back({"--json", json});
@@ -101,29 +98,15 @@ class ResampleRun {
     Session session_;
     StageTimes allTimes_;
     Json series_;
+    bool isSeries_ = false;
     std::optional<FixedFrame> seriesFrame_;
     SampleBudget budget_;  // of the step at hand
 };
 
-void widenRanges(std::vector<FieldSummary>& all, const std::vector<FieldSummary>& more) {
-    for (const FieldSummary& field : more) {
-        const auto same = std::find_if(all.begin(), all.end(), [&](const FieldSummary& other) {
-            return other.name == field.name && other.location == field.location;
-        });
-        if (same == all.end()) {
-            all.push_back(field);
-            continue;
-        }
-        for (std::size_t c = 0; c < std::min(same->ranges.size(), field.ranges.size()); ++c) {
-            same->ranges[c].min = std::min(same->ranges[c].min, field.ranges[c].min);
-            same->ranges[c].max = std::max(same->ranges[c].max, field.ranges[c].max);
-        }
-    }
-}
-
 int ResampleRun::run() {
     const std::vector<Step> steps = listSteps(arguments_);
     checkOutputs(steps, arguments_);
+    isSeries_ = steps.size() > 1 || !steps[0].source.collection.empty();
     if (!arguments_.like.empty()) {
         settings_.refine.frame = readVdbLattice(arguments_.like);
         // The file's spacing is the finest; what the caller gave beside it would contradict it.
@@ -151,8 +134,9 @@ int ResampleRun::run() {
 }
 
 ImportedMesh ResampleRun::read(const Step& step) {
-    const ReadOptions options{sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep};
-    return importMesh(step.input, options, repair_, session_);
+    const ReadOptions options =
+        readOptions(step.source, sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep);
+    return importMesh(step.source.files[0], options, repair_, session_);
 }
 
 RefineOptions ResampleRun::stepOptions(const TetMesh& mesh, const FieldSelection& selection) {
@@ -184,21 +168,21 @@ OutputShape ResampleRun::outputShape() const {
 /// One lattice and one value range for all steps need a look at all of them first.
 void ResampleRun::surveySeries(const std::vector<Step>& steps) {
     const bool frameGiven = settings_.refine.frame.has_value();
-    std::vector<FieldSummary> ranges;
-    Box3d bounds;
+    SeriesSummary summary;
     for (std::size_t i = 0; i < steps.size(); ++i) {
         session_.execution.report("series", std::int64_t(i), std::int64_t(steps.size()));
         const TetMesh mesh = read(steps[i]).mesh;
-        bounds.include(mesh.boundsWorld());
-        widenRanges(ranges, summarizeFields(mesh));
+        summary.add(steps[i].source, mesh);
         if (!frameGiven) surveySpacing(mesh);
     }
     if (!frameGiven) settings_.refine.frame = seriesFrame_;
     settings_.refine.resolution = 0;  // the frame holds the spacing from here on
     settings_.refine.spacingWorld = 0;
-    series_ = seriesJson(steps.size(), bounds, ranges);
-    session_.print(fmt::format("series of {} steps, finest spacing {:.6g}\n{}", steps.size(),
-                               settings_.refine.frame->spacingWorld, fieldsText(ranges)));
+    series_ = summary.json();
+    std::string text = fmt::format("series of {} steps, finest spacing {:.6g}\n{}", steps.size(),
+                                   settings_.refine.frame->spacingWorld, fieldsText(summary.fields()));
+    for (const std::string& note : summary.notes()) text += "  " + note + "\n";
+    session_.print(text);
 }
 
 /// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing
@@ -222,14 +206,15 @@ Json ResampleRun::runStep(const Step& step) {
     const FieldSelection selection = selectFields(file.mesh, settings_.fields);
     checkOutputFields(selection.outputs);
     const RefineOptions options = stepOptions(file.mesh, selection);
-    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
+    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()) +
+                   (step.source.time ? fmt::format("  time {}\n", *step.source.time) : std::string()));
     showRepair(step.input, file, repair_, session_);
 
     Json report{{"schema", 1},
                 {"program", "tessera"},
                 {"version", TESSERA_VERSION},
                 {"command", "resample"},
-                {"input", step.input},
+                {"input", step.source.files[0]},
                 {"output", arguments_.dryRun ? Json(nullptr) : Json(step.output)},
                 {"algorithm", resampler_.name()},
                 {"algorithm_reason", choice_.reason},
@@ -237,6 +222,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"criterion", arguments_.refine},
                 {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
+    if (isSeries_) report.update(stepJson(step.source));
     Json rest = arguments_.dryRun ? dryRun(step, file, selection, options, times)
                                   : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
@@ -300,7 +286,11 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
                  result, session_.execution);
     times.extendMs = timer.restart();
     VdbWriteOptions options = writeOptions();
-    options.sourceFile = std::filesystem::path(step.input).filename().string();
+    const SeriesStep& source = step.source;
+    options.sourceFile = std::filesystem::path(source.files.size() > 1 ? source.collection : source.files[0])
+                             .filename()
+                             .string();
+    options.time = source.time;
     // Where every target gives the same bits, naming one would make the file depend on the processor.
     if (!resampler_.targetsAgree()) options.target = result.target;
     VdbWriteResult written = writeVdb(step.output, selection.outputs, result, options, session_.execution);

@@ -25,7 +25,8 @@ class Session {
     Execution execution;
     ProgressBar progress;
 
-    /// Reads a mesh, in a process of its own unless the options say otherwise. Throws as readMesh does.
+    /// Reads a mesh, in a process of its own unless the options say otherwise; of a .pvd file the step that
+    /// the options name. Throws as readMesh does.
     MeshFile readMesh(const std::string& path, const ReadOptions& options) const;
 
     /// Prints to standard output, unless quiet or the JSON report goes there.
@@ -43,7 +44,7 @@ class Session {
 struct InfoArguments {
     CommonOptions common;
     RepairArguments repair;
-    std::string path;
+    std::vector<std::string> paths;  ///< a .vdb file, a mesh, or a series as resample takes it
     int timeStep = -1;
     bool gl = false;
 };

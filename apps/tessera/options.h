@@ -51,7 +51,8 @@ struct RepairArguments {
 /// The words of `tessera resample`, as typed.
 struct ResampleArguments {
     CommonOptions common;
-    std::string input, output;
+    std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
+    std::string output, times;        ///< times: "a:b"; empty: all
     std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max";
     AlgorithmArguments algorithm;
     RepairArguments repair;

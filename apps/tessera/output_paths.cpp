@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "io/mesh_series.h"
 
 namespace tessera {
 
@@ -40,9 +41,16 @@ std::string companion(const std::string& path) {
 
 void checkOutputPaths(const std::vector<std::string>& inputs, const std::vector<OutputPath>& outputs) {
     std::map<std::string, std::string> used;  // what each file is used for
-    for (const std::string& input : inputs)
+    const auto useInput = [&](const std::string& input) {
         for (const std::string& path : {input, companion(input)})
             if (!path.empty()) used.emplace(fileKey(path), "the input " + path);
+    };
+    for (const std::string& input : inputs) {
+        useInput(input);
+        if (!isCollectionName(input)) continue;
+        for (const SeriesStep& step : listSeries(std::span(&input, 1)))
+            for (const std::string& file : step.files) useInput(file);
+    }
     for (const OutputPath& output : outputs) {
         if (output.path.empty() || (output.option == "--json" && output.path == "-")) continue;
         const auto [before, isNew] =

@@ -11,8 +11,9 @@ struct OutputPath {
     std::string path;
 };
 
-/// Throws InputError when an output is the same file as an input or as another output, under whatever name:
-/// links and relative paths are followed. Empty paths, and "-" for --json, name no file and are passed over.
+/// Throws InputError when an output is the same file as an input, one that a .pvd file among them names, or
+/// another output, under whatever name: links and relative paths are followed. Empty paths, and "-" for
+/// --json, name no file and are passed over.
 void checkOutputPaths(const std::vector<std::string>& inputs, const std::vector<OutputPath>& outputs);
 
 }  // namespace tessera

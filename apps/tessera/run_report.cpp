@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -176,10 +177,15 @@ Json writeResultJson(const VdbWriteResult& w, int flatLevel) {
             {"notes", w.notes}};
 }
 
-Json seriesJson(std::size_t steps, const Box3d& bounds, const std::vector<FieldSummary>& fields) {
-    return {{"steps", steps},
-            {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}},
-            {"fields", fieldsJson(fields)}};
+Json seriesJson(const std::vector<std::optional<double>>& times, const Box3d& bounds,
+                const std::vector<FieldSummary>& fields) {
+    Json json{{"steps", times.size()}};
+    if (std::any_of(times.begin(), times.end(), [](const auto& time) { return time.has_value(); }))
+        for (const std::optional<double>& time : times)
+            json["times"].push_back(time ? Json(*time) : Json(nullptr));
+    json["bounds"] = {vectorJson(bounds.min), vectorJson(bounds.max)};
+    json["fields"] = fieldsJson(fields);
+    return json;
 }
 
 Json estimateJson(const PlanEstimate& e, double levelsMs, double flatMs) {

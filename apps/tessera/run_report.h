@@ -46,9 +46,11 @@ Json coverageJson(const ErrorReport& report);
 Json errorJson(const ErrorReport& report);
 Json stagesJson(const StageTimes& times);
 Json statisticsJson(const ResampleStatistics& statistics);
+/// @param flatLevel BrickResult::flatLevel.
 Json writeResultJson(const VdbWriteResult& written, int flatLevel);
-/// What the steps of a time series share.
-Json seriesJson(std::size_t steps, const Box3d& boundsWorld, const std::vector<FieldSummary>& fields);
+/// What the steps of a time series share. @param times one a step; the key is absent when none is known.
+Json seriesJson(const std::vector<std::optional<double>>& times, const Box3d& boundsWorld,
+                const std::vector<FieldSummary>& fields);
 Json estimateJson(const PlanEstimate& estimate, double levelsMs, double flatMs);
 
 /// Writes the document to `path` (nothing stands there until it is whole), or to standard output for "-".

@@ -12,6 +12,7 @@
 #include "commands.h"
 #include "interrupt.h"
 #include "report_text.h"
+#include "series_steps.h"
 
 namespace tessera {
 
@@ -26,6 +27,15 @@ void checkReaderOptions(const ReaderArguments& reader) {
         throw InputError("--max-read-time bounds a process of its own: --reader in-process has none");
     if (!reader.maxMemory.empty() && !reader.memoryBoundsRun)
         throw InputError("--max-memory bounds a process of its own here: --reader in-process has none");
+}
+
+/// @param number -1: the last.
+SeriesStep chosenStep(const std::string& collection, int number) {
+    const std::vector<SeriesStep> steps = listSeries(std::span(&collection, 1));
+    if (number >= int(steps.size()))
+        throw InputError(fmt::format("{}: there is no time step {}; it has {}, counted from 0", collection,
+                                     number, steps.size()));
+    return number < 0 ? steps.back() : steps[std::size_t(number)];
 }
 
 }  // namespace
@@ -54,6 +64,10 @@ Session::Session(const CommonOptions& options)
 }
 
 MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) const {
+    if (isCollectionName(path)) {
+        const SeriesStep step = chosenStep(path, options.timeStep);
+        return readMesh(step.files[0], readOptions(step, options.fields, -1));
+    }
     if (!isolated_) return tessera::readMesh(path, options, execution);
     static const std::string quick = quickReaderBeside(program);
     return readMeshIsolated({program, {kReadMeshCommand}, quick}, path, options, limits_, execution);

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "base/error.h"
@@ -55,6 +56,7 @@ void keepOnly(const std::vector<std::int32_t>& kept, std::vector<Item>& items) {
 
 /// Drops the nodes that no cell uses and renumbers. Returns the old index of every node that stays; empty
 /// when all do.
+/// @param blockIndex, blockCount of the blocks of this block's file.
 std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& block, std::size_t blockIndex,
                                           std::size_t blockCount, const Execution& execution) {
     std::vector<std::int32_t> newIndex(block.points.size(), -1);
@@ -94,11 +96,11 @@ void gatherTuples(Field& field, const std::vector<Index>& items, const Execution
     field.values = std::move(values);
 }
 
-/// The merged index of every point of every block: points with one number are one, where all have numbers
-/// and these are dense.
-/// @param count receives the number of merged points.
-std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>& blocks,
-                                                     std::size_t& count) {
+/// Appends the merged index of every point of every block of one file: points with one number are one, where
+/// all have numbers and these are dense.
+/// @param count the number of merged points, which grows.
+void appendMergedIndices(std::span<const RawBlock> blocks, std::size_t& count,
+                         std::vector<std::vector<std::int32_t>>& indices) {
     constexpr std::int64_t kMostNumbersAPoint = 64;  // a table of more isn't worth the memory
     bool numbered = true;
     std::int64_t largest = 0, points = 0;
@@ -111,9 +113,7 @@ std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>
         points += std::int64_t(block.points.size());
     }
     numbered = numbered && largest < kMostNumbersAPoint * points;
-    std::vector<std::vector<std::int32_t>> indices;
     std::vector<std::int32_t> indexOf(numbered ? std::size_t(largest) + 1 : 0, -1);
-    count = 0;
     for (const RawBlock& block : blocks) {
         std::vector<std::int32_t>& index = indices.emplace_back(block.points.size());
         for (std::size_t i = 0; i < index.size(); ++i) {
@@ -126,15 +126,41 @@ std::vector<std::vector<std::int32_t>> mergedIndices(const std::vector<RawBlock>
             index[i] = merged;
         }
     }
-    return indices;
+}
+
+/// The blocks of the file that block b comes from.
+std::span<RawBlock> blocksOfFile(std::vector<RawBlock>& blocks, std::size_t b) {
+    std::size_t begin = b, end = b + 1;
+    while (begin > 0 && blocks[begin - 1].part == blocks[b].part) --begin;
+    while (end < blocks.size() && blocks[end].part == blocks[b].part) ++end;
+    return std::span(blocks).subspan(begin, end - begin);
+}
+
+/// Where fields are the same on both sides, the mesh goes on across the borders of its parts.
+void joinAcrossParts(RawBlock& all, const std::vector<std::size_t>& firstPoint, ImportStatistics& statistics,
+                     const Execution& execution) {
+    const JoinedPoints joined = joinParts(all, firstPoint, execution);
+    if (joined.apart > 0)
+        statistics.warnings.push_back(std::to_string(joined.apart) +
+                                      " nodes on borders of parts have other values there than in the part "
+                                      "beside; they stay nodes of their own.");
+    if (joined.kept.size() == all.points.size()) return;
+    forEachNode(all.cells, execution, [&](std::int32_t& node) { node = joined.newIndex[std::size_t(node)]; });
+    keepOnly(joined.kept, all.points);
+    for (Field& field : all.fields)
+        if (field.location == FieldLocation::point) gatherTuples(field, joined.kept, execution);
 }
 
 /// One block with points, cells and fields of all; cell fields have one tuple for every listed cell.
-RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& execution) {
+RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const ReadOptions& options,
+                     const Execution& execution) {
     std::size_t points = 0, cells = 0;
     for (std::size_t b = 0; b < raw.blocks.size(); ++b) {
         RawBlock& block = raw.blocks[b];
-        const std::vector<std::int32_t> kept = dropUnusedNodes(path, block, b, raw.blocks.size(), execution);
+        const std::span<RawBlock> beside = blocksOfFile(raw.blocks, b);
+        const std::string& file = block.part == 0 ? path : options.otherParts[block.part - 1];
+        const std::vector<std::int32_t> kept =
+            dropUnusedNodes(file, block, std::size_t(&block - beside.data()), beside.size(), execution);
         for (Field& field : block.fields) {
             if (field.location == FieldLocation::point && !kept.empty())
                 gatherTuples(field, kept, execution);
@@ -147,7 +173,7 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
         cells += block.cells.kinds.size();
     }
     if (points > std::size_t(std::numeric_limits<std::int32_t>::max()))
-        throw InputError(path + ": has " + std::to_string(points) +
+        throw InputError(meshName(path, options) + ": has " + std::to_string(points) +
                          " nodes; at most 2147483647 are possible");
     if (raw.blocks.size() == 1) return std::move(raw.blocks[0]);
 
@@ -155,7 +181,12 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
     std::map<std::pair<FieldLocation, std::string>, std::size_t> fieldOf;
     std::set<std::pair<FieldLocation, std::string>> partial;
     std::size_t mergedPoints = 0, cellBase = 0;
-    std::vector<std::vector<std::int32_t>> indices = mergedIndices(raw.blocks, mergedPoints);
+    std::vector<std::vector<std::int32_t>> indices;
+    std::vector<std::size_t> firstPointOfPart;
+    for (std::size_t b = 0; b < raw.blocks.size(); b = indices.size()) {
+        firstPointOfPart.push_back(mergedPoints);
+        appendMergedIndices(blocksOfFile(raw.blocks, b), mergedPoints, indices);
+    }
     all.points.resize(mergedPoints);
     for (std::size_t b = 0; b < raw.blocks.size(); ++b) {
         RawBlock& block = raw.blocks[b];
@@ -198,9 +229,10 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const Execution& exe
         block = {};
     }
     for (const auto& [location, name] : partial)
-        raw.statistics.warnings.push_back("Field '" + name +
-                                          "' is absent in some blocks or has another number of " +
-                                          "components there; its values are NaN in these.");
+        raw.statistics.warnings.push_back(
+            "Field '" + name + "' is absent in some " + (firstPointOfPart.size() > 1 ? "parts" : "blocks") +
+            " or has another number of components there; its values are NaN in these.");
+    if (firstPointOfPart.size() > 1) joinAcrossParts(all, firstPointOfPart, raw.statistics, execution);
     return all;
 }
 
@@ -292,6 +324,13 @@ bool isPureTets(const CellList& cells) {
 
 }  // namespace
 
+std::string meshName(const std::string& path, const ReadOptions& options) {
+    const std::size_t others = options.otherParts.size();
+    return others == 0
+               ? path
+               : path + " (and " + std::to_string(others) + (others == 1 ? " other part)" : " other parts)");
+}
+
 std::string cellFieldName(const std::string& name) {
     return name + "_cell";
 }
@@ -306,33 +345,34 @@ bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation
 
 MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options,
                       const Execution& execution) {
+    const std::string name = meshName(path, options);
     ImportStatistics& statistics = raw.statistics;
     statistics.blocks = std::int64_t(raw.blocks.size());
     statistics.cells = 0;
     for (const RawBlock& block : raw.blocks) statistics.cells += block.cells.cellCount();
     if (statistics.cells == 0)
-        throw InputError(path + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
+        throw InputError(name + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
                          " others: points, lines, surfaces or unknown; " +
                          std::to_string(statistics.blankedCells) + " blanked or ghost cells)");
     if (statistics.higherOrderCells > 0)
         statistics.warnings.push_back(
             std::to_string(statistics.higherOrderCells) + " of " + std::to_string(statistics.cells) +
             " cells are of higher order; they are read by their corner nodes only, as linear cells.");
-    RawBlock block = mergeBlocks(path, raw, execution);
+    RawBlock block = mergeBlocks(path, raw, options, execution);
     renameTwins(block, statistics);
-    selectFields(path, block, options);
+    selectFields(name, block, options);
     warnSkippedArrays(block, statistics);
 
     MeshFile file;
     const bool pureTets = isPureTets(block.cells);
     SplitCells split = splitCells(block.points, block.cells, execution);
     if (std::int64_t(split.tets.size()) >= (std::int64_t(1) << 30))
-        throw InputError(path + ": gives " + std::to_string(split.tets.size()) +
+        throw InputError(name + ": gives " + std::to_string(split.tets.size()) +
                          " tetrahedra; fewer than 2^30 are possible");
     file.mesh.points = std::move(block.points);
     for (const AddedNode& node : split.addedNodes) {
         if (!std::isfinite(node.point.x) || !std::isfinite(node.point.y) || !std::isfinite(node.point.z))
-            throw InputError(path +
+            throw InputError(name +
                              ": the centre of a cell isn't finite: its coordinates are too large to add");
         file.mesh.points.push_back(node.point);
     }
@@ -347,7 +387,7 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     }
     file.mesh.tets = std::move(split.tets);
     if (file.mesh.tets.empty())
-        throw InputError(path +
+        throw InputError(name +
                          ": all cells are collapsed: none has four different nodes that span a tetrahedron");
     fillStatistics(file.mesh, statistics, execution);
     file.statistics = std::move(statistics);

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "io/mesh_packet.h"
+#include "io/raw_mesh.h"
 #include "io/reader_process.h"
 #include "io/reader_report.h"
 
@@ -41,8 +42,15 @@ std::string inSeconds(double seconds) {
 class IsolatedReading {
   public:
     /// @param given as the caller gave them: 0 for the usual ones.
-    IsolatedReading(const std::string& path, const IsolationLimits& given, const Execution& execution)
-        : path_(path), given_(given), usual_(defaultLimits(path)), limits_(usual_), execution_(execution) {
+    IsolatedReading(const std::string& path, const ReadOptions& options, const IsolationLimits& given,
+                    const Execution& execution)
+        : path_(path),
+          options_(options),
+          name_(meshName(path, options)),
+          given_(given),
+          usual_(defaultLimits(path, options.otherParts)),
+          limits_(usual_),
+          execution_(execution) {
         if (given.memoryBytes > 0) limits_.memoryBytes = given.memoryBytes;
         if (given.seconds > 0) {
             limits_.seconds = given.seconds;
@@ -51,7 +59,7 @@ class IsolatedReading {
         if (given.processorSeconds > 0) limits_.processorSeconds = given.processorSeconds;
     }
 
-    MeshFile run(const IsolatedReader& reader, const ReadOptions& options);
+    MeshFile run(const IsolatedReader& reader);
 
   private:
     MeshFile takeMesh(ReaderProcess& process);
@@ -67,6 +75,8 @@ class IsolatedReading {
     [[noreturn]] void failWithEnd(const ProcessEnd& end) const;
 
     const std::string& path_;
+    const ReadOptions& options_;
+    std::string name_;  // for messages
     IsolationLimits given_, usual_, limits_;
     const Execution& execution_;
     std::vector<std::byte> report_;
@@ -79,12 +89,12 @@ ReportStart IsolatedReading::start() const {
 }
 
 void IsolatedReading::failWithGarbage(const std::string& why) const {
-    throw InputError(path_ + ": the reader went wrong and handed over no sound mesh (" + why +
+    throw InputError(name_ + ": the reader went wrong and handed over no sound mesh (" + why +
                      "); the file is damaged, or hits a bug of the library that reads it");
 }
 
 void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
-    throw InputError(path_ + ": the reader " + end.words +
+    throw InputError(name_ + ": the reader " + end.words +
                      "; the file is damaged, or hits a bug of the library that reads it");
 }
 
@@ -113,7 +123,7 @@ bool IsolatedReading::receive(int descriptor) {
 }
 
 void IsolatedReading::checkTimes(double spentMs, const ReaderProcess& process) const {
-    const std::string taken = path_ + ": reading it took more than ";
+    const std::string taken = name_ + ": reading it took more than ";
     const std::string usual = ", the limit for a file like this; --max-read-time sets another";
     if (spentMs >= limits_.seconds * 1e3) {
         if (given_.seconds <= 0) throw InputError(taken + inSeconds(limits_.seconds) + usual);
@@ -156,7 +166,7 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
             throw InternalError(message);
         case ReaderOutcome::overLimit:
             throw InputError(
-                path_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
+                name_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
                 (given_.memoryBytes > 0
                      ? "the limit given; for a file like this it would be " + inMiB(usual_.memoryBytes)
                      : "the limit for a file like this; --max-memory sets another"));
@@ -200,9 +210,9 @@ std::optional<MeshFile> IsolatedReading::readQuickly(const std::string& executab
     return takeMesh(*process);
 }
 
-MeshFile IsolatedReading::run(const IsolatedReader& reader, const ReadOptions& options) {
+MeshFile IsolatedReading::run(const IsolatedReader& reader) {
     const std::vector<std::string> request =
-        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options});
+        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options_});
     if (!reader.quickExecutable.empty()) {
         if (std::optional<MeshFile> mesh = readQuickly(reader.quickExecutable, request))
             return *std::move(mesh);
@@ -231,7 +241,7 @@ std::string quickReaderBeside(const std::string& executable) {
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
                           const IsolationLimits& limits, const Execution& execution) {
     execution.throwIfCancelled();
-    return IsolatedReading(path, limits, execution).run(reader, options);
+    return IsolatedReading(path, options, limits, execution).run(reader);
 }
 
 }  // namespace tessera

@@ -33,12 +33,12 @@ struct IsolationLimits {
     double processorSeconds = 0;  ///< of all its threads together; no bound where only `seconds` is given
 };
 
-/// Bounds for a mesh of this size on disk, its companion files included, each once: 640 MiB and 96 bytes a
-/// byte of file, at most three quarters of the memory here; 3 s of processor time and a second for every 4
-/// MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells in fewer
-/// bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK file
-/// declares. Throws InputError when the file is missing, empty or damaged at first sight.
-IsolationLimits defaultLimits(const std::string& path);
+/// Bounds for a mesh of this size on disk, its other parts and companion files included, each once: 640 MiB
+/// and 96 bytes a byte of file, at most three quarters of the memory here; 3 s of processor time and a second
+/// for every 4 MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells
+/// in fewer bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK
+/// file declares. Throws InputError when the file is missing, empty or damaged at first sight.
+IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts = {});
 
 /// readMesh in a process of its own, which takes crashes, endless loops and endless demands for memory with
 /// it: they become an InputError that names the file and what happened. Errors, warnings and the mesh are

@@ -82,12 +82,43 @@ RawMesh readRaw(const std::string& path, const ReadOptions& options, const Execu
     throw InputError(path + ": unknown format; known are " + kFormats);
 }
 
+/// Adds another file of the same mesh.
+void appendPart(RawMesh& mesh, RawMesh part, std::size_t number, const std::string& first,
+                const std::string& path) {
+    if (part.statistics.format != mesh.statistics.format)
+        throw InputError(path + ": is of another kind (" + part.statistics.format + ") than " + first + " (" +
+                         mesh.statistics.format + "), and both are parts of one mesh");
+    for (RawBlock& block : part.blocks) {
+        block.part = number;
+        mesh.blocks.push_back(std::move(block));
+    }
+    mesh.statistics.skippedCells += part.statistics.skippedCells;
+    mesh.statistics.blankedCells += part.statistics.blankedCells;
+    mesh.statistics.higherOrderCells += part.statistics.higherOrderCells;
+    std::vector<std::string>& warnings = mesh.statistics.warnings;
+    for (std::string& warning : part.statistics.warnings)  // most are the same for every part
+        if (std::find(warnings.begin(), warnings.end(), warning) == warnings.end())
+            warnings.push_back(std::move(warning));
+}
+
+/// Parallel programs write such parts too.
+void warnOfEmptyPart(const RawMesh& part, const std::string& path, ImportStatistics& statistics) {
+    if (part.blocks.empty()) statistics.warnings.push_back("Part " + path + " has no 3D cells of its own.");
+}
+
 }  // namespace
 
 MeshFile readByFormat(const std::string& path, const ReadOptions& options, const Execution& execution,
                       OpenVtkFormat openOther) {
     execution.throwIfCancelled();
     RawMesh raw = readRaw(path, options, execution, openOther);
+    if (!options.otherParts.empty()) warnOfEmptyPart(raw, path, raw.statistics);
+    for (std::size_t p = 0; p < options.otherParts.size(); ++p) {
+        execution.throwIfCancelled();
+        RawMesh part = readRaw(options.otherParts[p], options, execution, openOther);
+        warnOfEmptyPart(part, options.otherParts[p], part.statistics);
+        appendPart(raw, std::move(part), p + 1, path, options.otherParts[p]);
+    }
     return assembleMesh(path, std::move(raw), options, execution);
 }
 

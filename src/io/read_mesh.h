@@ -36,8 +36,9 @@ struct ImportStatistics {
 };
 
 struct ReadOptions {
-    std::vector<std::string> fields;  ///< names to read; empty: all
-    int timeStep = -1;                ///< formats with steps: which one, counted from 0; -1: the last
+    std::vector<std::string> fields;        ///< names to read; empty: all
+    int timeStep = -1;                      ///< formats with steps: which one, counted from 0; -1: the last
+    std::vector<std::string> otherParts{};  ///< further files of the same format that hold parts of this mesh
 };
 
 struct MeshFile {
@@ -50,7 +51,8 @@ struct MeshFile {
 /// points and cells have a field of one name, that of the cells gets the suffix "_cell". Throws InputError,
 /// naming the file and the place, when the file is missing, empty, damaged, of unknown format, has no 3D
 /// cells, a node index out of range, a coordinate that isn't finite (says which node), a non-numeric array or
-/// no such field (lists those there).
+/// no such field (lists those there). With otherParts all files are one mesh: cells that a part has as ghosts
+/// are left out, and nodes of different parts that lie at exactly one place, with the same values, are one.
 MeshFile readMesh(const std::string& path, const ReadOptions& options, const Execution& execution);
 
 /// readMesh for VTK XML, legacy VTK and TetGen files alone: a program that calls only this starts ten times
@@ -62,10 +64,6 @@ class OtherFormatError : public InputError {
   public:
     using InputError::InputError;
 };
-
-/// The files of a time series, in order: a pattern with * or ?, a .pvd file, or a single mesh file. Throws
-/// InputError when none matches.
-std::vector<std::string> listSeries(const std::string& pathOrPattern);
 
 /// Writes the elements and fields as appended, zlib-compressed .vtu with points in double, for checks by
 /// other programs. Atomic: nothing stands at `path` until the file is whole. Throws IoError.

@@ -73,8 +73,13 @@ InputSize sizeOfInput(const std::string& path) {
 
 }  // namespace
 
-IsolationLimits defaultLimits(const std::string& path) {
-    const InputSize size = sizeOfInput(path);
+IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts) {
+    InputSize size = sizeOfInput(path);
+    for (const std::string& part : otherParts) {
+        const InputSize more = sizeOfInput(part);
+        size.bytes += more.bytes;
+        size.items += more.items;
+    }
     IsolationLimits limits;
     double bytes = kFloorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items);
     const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);

@@ -8,10 +8,10 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kFixedWords = 6;
+constexpr std::size_t kFixedWords = 7;
 // The other program may be of another build: what they say to each other has a number, to be raised with each
 // change.
-constexpr const char* kProtocol = TESSERA_VERSION "/2";
+constexpr const char* kProtocol = TESSERA_VERSION "/3";
 constexpr const char* kByItself = "the reader of meshes is started by tessera itself";
 
 template <class Number>
@@ -26,14 +26,16 @@ Number parseNumber(const std::string& word) {
 }  // namespace
 
 std::vector<std::string> requestWords(const ReaderRequest& request) {
-    static_assert(sizeof(ReadOptions) == sizeof(std::vector<std::string>) + 8,
+    static_assert(sizeof(ReadOptions) == 2 * sizeof(std::vector<std::string>) + 8,
                   "a new member of ReadOptions needs its word here and in parseRequest");
     std::vector<std::string> words{kProtocol,
                                    std::to_string(request.parent),
                                    std::to_string(request.memoryBytes),
                                    std::to_string(request.threads),
                                    std::to_string(request.options.timeStep),
+                                   std::to_string(request.options.otherParts.size()),
                                    request.path};
+    words.insert(words.end(), request.options.otherParts.begin(), request.options.otherParts.end());
     words.insert(words.end(), request.options.fields.begin(), request.options.fields.end());
     return words;
 }
@@ -46,8 +48,12 @@ ReaderRequest parseRequest(std::span<const std::string> words) {
     request.memoryBytes = parseNumber<std::int64_t>(words[2]);
     request.threads = parseNumber<int>(words[3]);
     request.options.timeStep = parseNumber<int>(words[4]);
-    request.path = words[5];
-    request.options.fields.assign(words.begin() + kFixedWords, words.end());
+    const auto parts = parseNumber<std::size_t>(words[5]);
+    request.path = words[6];
+    const std::span<const std::string> rest = words.subspan(kFixedWords);
+    if (parts > rest.size()) throw InputError(std::string(kByItself) + "; a part has no name");
+    request.options.otherParts.assign(rest.begin(), rest.begin() + std::ptrdiff_t(parts));
+    request.options.fields.assign(rest.begin() + std::ptrdiff_t(parts), rest.end());
     return request;
 }
 

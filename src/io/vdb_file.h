@@ -40,9 +40,10 @@ struct VdbWriteOptions {
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
     std::string algorithm, criterion, sourceFile;
-    std::string target;        ///< the device, of algorithms whose results depend on it; else empty
-    std::string sampleFormat;  ///< what values were kept in while sampling; empty: 32-bit floats
-    std::string repair;        ///< how the mesh was repaired before, as JSON; empty: it wasn't
+    std::string target;          ///< the device, of algorithms whose results depend on it; else empty
+    std::string sampleFormat;    ///< what values were kept in while sampling; empty: 32-bit floats
+    std::string repair;          ///< how the mesh was repaired before, as JSON; empty: it wasn't
+    std::optional<double> time;  ///< of the step, in the series' own unit
 };
 
 /// What was written.
@@ -85,6 +86,7 @@ struct VdbFile {
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
     std::string target, sampleFormat, repair;  ///< as in VdbWriteOptions
+    std::optional<double> time;                ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
     double voxelShift = 0;             ///< of the grids' places, in voxels of each along the mesh's axes

@@ -240,6 +240,7 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     if (!metadata.target.empty()) entries["tessera_target"] = metadata.target;
     if (!metadata.sampleFormat.empty()) entries["tessera_sample_format"] = metadata.sampleFormat;
     if (!metadata.repair.empty()) entries["tessera_repair"] = metadata.repair;
+    if (metadata.time) entries["tessera_time"] = exactText(*metadata.time);
     entries["tessera_criterion"] = metadata.criterion;
     entries["tessera_layout"] = choiceName(metadata.layout, kLayouts);
     entries["tessera_up_axis"] = choiceName(metadata.upAxis, kUpAxes);
@@ -273,6 +274,10 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     if (entries.contains("tessera_sample_format"))
         metadata.sampleFormat = entry(entries, "tessera_sample_format");
     if (entries.contains("tessera_repair")) metadata.repair = entry(entries, "tessera_repair");
+    if (entries.contains("tessera_time")) {
+        metadata.time = readDouble(entry(entries, "tessera_time"), "tessera_time");
+        if (!std::isfinite(*metadata.time)) damaged("tessera_time isn't finite");
+    }
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");

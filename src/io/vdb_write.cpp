@@ -447,6 +447,7 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.target = options.target;
     metadata.sampleFormat = options.sampleFormat;
     metadata.repair = options.repair;
+    metadata.time = options.time;
     metadata.unitScale = written.unitScale;
     metadata.upAxis = options.upAxis;
     metadata.halfFloat = options.halfFloat;

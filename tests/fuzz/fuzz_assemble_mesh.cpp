@@ -93,7 +93,14 @@ void run(std::string_view input) {
     raw.statistics.format = "fuzz";
     const int blocks = 1 + bytes.next(3);
     for (int b = 0; b < blocks && !bytes.empty(); ++b) raw.blocks.push_back(makeBlock(bytes));
-    fuzz::checkAssembled(assembleMesh("fuzz", std::move(raw), {}, fuzz::oneThread()));
+    fuzz::checkAssembled(assembleMesh("fuzz", raw, {}, fuzz::oneThread()));
+    // The same as parts of a mesh, each a file.
+    ReadOptions options;
+    for (std::size_t b = 1; b < raw.blocks.size(); ++b) {
+        raw.blocks[b].part = b;
+        options.otherParts.push_back("part");
+    }
+    fuzz::checkAssembled(assembleMesh("fuzz", std::move(raw), options, fuzz::oneThread()));
 }
 
 }  // namespace
