@@ -209,14 +209,15 @@ TEST(Seams, ExtensionHoldsEveryPointWithinTheLayersAndTheNearestValue) {
 // With one layer the whole mesh can be read from the store, tips included that no lattice point lies in.
 TEST(Seams, ExtensionGivesEveryPlaceOfTheMeshItsCorners) {
     TetMesh mesh = ballMesh(6, 1.0);
-    for (Vec3d& p : mesh.points) p = Vec3d(std::exp(1.5 * p.x), p.y * std::exp(1.5 * p.x), p.z);
+    for (Vec3d& p : mesh.points)
+        p = Vec3d(std::exp(2 * p.x), p.y * std::exp(2 * p.x), p.z * std::exp(2 * p.x));
     // A needle of a fraction of a voxel's thickness.
     const auto base = std::int32_t(mesh.points.size());
     for (const Vec3d& p :
-         {Vec3d(4.4, 0, 0), Vec3d(4.4, 0.003, 0), Vec3d(4.4, 0, 0.003), Vec3d(5.37, 0.411, 0.333)})
+         {Vec3d(7.3, 0, 0), Vec3d(7.3, 0.003, 0), Vec3d(7.3, 0, 0.003), Vec3d(8.37, 0.411, 0.333)})
         mesh.points.push_back(p);
     mesh.tets.push_back({base, base + 1, base + 2, base + 3});
-    Sampled sampled = sampledByElementSize(std::move(mesh), 3, 120, 3);
+    Sampled sampled = sampledByElementSize(std::move(mesh), 4, 257, 4);
     ASSERT_GE(sampled.tree.levelCount(), 3);
     const NearestOnDemand nearest(sampled.mesh, 1);
     extend(sampled, nearest, 1);
