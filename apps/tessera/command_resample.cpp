@@ -13,6 +13,7 @@
 #include "memory_plan.h"
 #include "output_paths.h"
 #include "predict_cost.h"
+#include "program_presets.h"
 #include "registry/registry.h"
 #include "report_text.h"
 
@@ -211,10 +212,11 @@ Json ResampleRun::runStep(const Step& step) {
     Timer timer;
     const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
-    const FieldSelection selection = selectFields(file.mesh, settings_.fields);
+    FieldSelection selection = selectFields(file.mesh, settings_.fields);
+    const std::string names = nameFields(selection.outputs, settings_.fields, arguments_.program);
     checkOutputFields(selection.outputs);
     const RefineOptions options = stepOptions(file.mesh, selection);
-    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()));
+    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()) + names);
     showRepair(step.input, file, repair_, session_);
 
     Json report{{"schema", 1},
@@ -229,6 +231,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"criterion", arguments_.refine},
                 {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
+    if (!arguments_.program.empty()) report["for"] = arguments_.program;
     Json rest = arguments_.dryRun ? dryRun(step, file, selection, options, times)
                                   : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
@@ -359,7 +362,8 @@ void ResampleRun::printResult(const Step& step, const BrickResult& result,
 }  // namespace
 
 int runResample(const ResampleArguments& arguments) {
-    return ResampleRun(arguments).run();
+    const ResampleArguments settled = settleProgram(arguments);
+    return ResampleRun(settled).run();
 }
 
 }  // namespace tessera

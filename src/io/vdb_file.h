@@ -37,6 +37,8 @@ struct VdbWriteOptions {
     UpAxis upAxis = UpAxis::keep;
     double unitScale =
         0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
+    double voxelShift =
+        0;  ///< the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
     std::int64_t maxFlatVoxels = 0;    ///< flat: bound on points; 0: 2^26. Never above 2^31.
     std::int64_t maxFlatBytes = 0;     ///< flat: bound on the grids' memory; 0: a quarter of the machine's
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
@@ -90,7 +92,8 @@ struct VdbFile {
     std::string target, sampleFormat, repair;  ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
-    bool halfFloat = false;            ///< values were rounded to half floats
+    double voxelShift = 0;   ///< as in VdbWriteOptions; `tree` has the places of the samples themselves
+    bool halfFloat = false;  ///< values were rounded to half floats
     std::optional<Box3d> boundsWorld;  ///< the box that was asked for: no error was measured outside it
     float background = 0;
     int flatLevel = 0;  ///< flat: the level whose spacing the grids have

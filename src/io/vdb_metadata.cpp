@@ -243,6 +243,7 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_criterion"] = metadata.criterion;
     entries["tessera_layout"] = choiceName(metadata.layout, kLayouts);
     entries["tessera_up_axis"] = choiceName(metadata.upAxis, kUpAxes);
+    if (metadata.voxelShift != 0) entries["tessera_voxel_shift"] = exactText(metadata.voxelShift);
     entries["tessera_unit_scale"] = exactText(metadata.unitScale);
     entries["tessera_spacing"] = exactText(metadata.tree.spacingWorld(0));
     entries["tessera_precision"] = metadata.halfFloat ? "half" : "float";
@@ -273,6 +274,8 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     if (entries.contains("tessera_repair")) metadata.repair = entry(entries, "tessera_repair");
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
+    if (const auto shift = entries.find("tessera_voxel_shift"); shift != entries.end())
+        metadata.voxelShift = readDouble(shift->second, shift->first);
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");
     metadata.halfFloat = entry(entries, "tessera_precision") == "half";
     metadata.background = float(readDouble(entry(entries, "tessera_background"), "tessera_background"));
