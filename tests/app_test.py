@@ -771,7 +771,7 @@ class Slices(AppTest):
     def test_fields_that_would_clash_get_another_name(self):
         self.write("clash.vtu", vtu_text(fields={"coverage": range(8), "A": range(8), "Power": range(8), "a.b": range(8)}))
         report = self.slice("clash.vtu", "-o", "cut.exr")
-        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["A_", "Power_", "a_b", "coverage_"])
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["coverage_", "A_", "Power_", "a_b"])
 
     def test_bad_input_says_what_is_wrong(self):
         self.reject_slice("normal zero", "--normal", "0,0,0")

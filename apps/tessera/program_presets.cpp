@@ -29,11 +29,11 @@ struct Program {
 constexpr std::array kPrograms{
     // Draws voxel i around i + 1/2, isosurfaces along the file's axes and volumes along the grid's.
     Program{"blender", "Blender", "keep",
-            "it shifts isosurfaces and volumes of a turned grid differently; turn the object in Blender", 1,
-            -0.5, "density", "velocity"},
+            "Blender shifts isosurfaces and volumes of a turned grid differently, so turn the object there",
+            1, -0.5, "density", "velocity"},
     Program{"houdini", "Houdini", "y", "", 1, 0, "density", "vel"},
     // Leaves out the last layer of voxels on each axis.
-    Program{"paraview", "ParaView", "keep", "it takes no notice of a turned grid", 2, 0, "", ""},
+    Program{"paraview", "ParaView", "keep", "ParaView takes no notice of a turned grid", 2, 0, "", ""},
 };
 
 const Program& findProgram(const std::string& name) {

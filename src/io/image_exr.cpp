@@ -99,21 +99,19 @@ void writeExr(const std::string& path, const ExrImage& image, const Execution& e
         header.compression() = Imf::ZIP_COMPRESSION;
         for (const ExrAttribute& attribute : image.attributes) addAttribute(header, attribute);
         Imf::FrameBuffer pixels;
-        const auto add = [&](const std::string& name, const float* first, std::size_t stride) {
+        const auto add = [&](const std::string& name, const ExrChannel& channel) {
             header.channels().insert(name, Imf::Channel(Imf::FLOAT));
             // The library's slices are read from here on, whatever their type says.
-            char* values = const_cast<char*>(reinterpret_cast<const char*>(first));
-            pixels.insert(name, Imf::Slice(Imf::FLOAT, values, stride, stride * std::size_t(image.width)));
+            char* values = const_cast<char*>(reinterpret_cast<const char*>(channel.values.data()));
+            pixels.insert(name, Imf::Slice(Imf::FLOAT, values, sizeof(float),
+                                           sizeof(float) * std::size_t(image.width)));
         };
-        for (const ExrChannel& channel : image.channels)
-            add(channel.name, channel.values.data(), sizeof(float));
+        for (const ExrChannel& channel : image.channels) add(channel.name, channel);
         for (std::size_t c = 0; c < image.shown.size(); ++c) {
-            static constexpr float kZero = 0;
-            if (image.shown[c] == kExrZeros)
-                add(kShownNames[c], &kZero, 0);
-            else
-                add(kShownNames[c], image.channels.at(std::size_t(image.shown[c])).values.data(),
-                    sizeof(float));
+            if (image.shown[c] != kExrZeros)
+                add(kShownNames[c], image.channels.at(std::size_t(image.shown[c])));
+            else  // the library writes zeros for a channel without pixels
+                header.channels().insert(kShownNames[c], Imf::Channel(Imf::FLOAT));
         }
         AtomicExrStream stream(file);
         Imf::OutputFile output(stream, header);

@@ -274,8 +274,10 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     if (entries.contains("tessera_repair")) metadata.repair = entry(entries, "tessera_repair");
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
-    if (const auto shift = entries.find("tessera_voxel_shift"); shift != entries.end())
+    if (const auto shift = entries.find("tessera_voxel_shift"); shift != entries.end()) {
         metadata.voxelShift = readDouble(shift->second, shift->first);
+        if (!(std::abs(metadata.voxelShift) <= 1)) damaged("tessera_voxel_shift is out of range");
+    }
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");
     metadata.halfFloat = entry(entries, "tessera_precision") == "half";
     metadata.background = float(readDouble(entry(entries, "tessera_background"), "tessera_background"));
