@@ -623,6 +623,69 @@ class Reports(AppTest):
         self.reject(2, "speed pressure", "picture", "out.vdb", "-o", "other.png", "--field", "speed")
 
 
+class Programs(AppTest):
+    """tessera resample --for."""
+
+    def setUp(self):
+        super().setUp()
+        vector = f'<DataArray type="Float64" Name="U" NumberOfComponents="3" format="ascii">{numbers(CUBE_POINTS)}</DataArray>'
+        self.flow = self.write("flow.vtu", vtu_text(fields={"p": range(8), "T": range(8)}, extra=vector))
+
+    def info(self, *options):
+        self.succeed("resample", self.flow, "-o", "out.vdb", "--quiet", *options)
+        return self.report("info", "out.vdb")
+
+    def names(self, *options):
+        return {grid["name"] for grid in self.info(*options)["grids"]}
+
+    def test_each_sets_layout_shift_and_names(self):
+        for program, shift, names in (
+            ("blender", -0.5, {"density", "T", "velocity", "coverage"}),
+            ("houdini", 0, {"density", "T", "vel", "coverage"}),
+            ("paraview", 0, {"p", "T", "U", "coverage"}),
+        ):
+            info = self.info("--for", program, "--field", "p,T,U")
+            self.assertEqual((info["layout"], info.get("voxel_shift", 0)), ("flat", shift))
+            self.assertEqual({grid["name"] for grid in info["grids"]}, names)
+            report = self.report("resample", self.flow, "-o", "out.vdb", "--for", program)
+            self.assertEqual((report["for"], report["layout"]), (program, "flat"))
+
+    def test_what_is_given_beside_it_wins(self):
+        self.assertNotIn("voxel_shift", self.info("--for", "blender", "--voxel-shift", "0"))
+        self.assertEqual(self.names("--for", "blender", "--field", "p=p,T,U=v"), {"p", "density", "v", "coverage"})
+        self.assertEqual(self.names("--for", "houdini", "--field", "p,T=density,U"), {"p", "density", "vel", "coverage"})
+        wide, narrow = (
+            max(grid["active_voxels"] for grid in self.info("--for", "paraview", "--extend", layers)["grids"]) for layers in (2, 0)
+        )
+        self.assertGreater(wide, narrow)
+        self.assertEqual(max(grid["active_voxels"] for grid in self.info("--for", "paraview")["grids"]), wide)
+        self.info("--for", "houdini", "--up-axis", "keep")
+
+    def test_says_which_names_it_gave(self):
+        text = self.succeed("resample", self.flow, "-o", "out.vdb", "--for", "blender", "--field", "T,U")
+        self.assertIn("T is written as grid density", text)
+        self.assertIn("U is written as grid velocity", text)
+
+    def test_contradictions_are_refused(self):
+        self.resample_fails("--layout flat Blender", self.flow, "--for", "blender", "--layout", "levels")
+        self.resample_fails("--up-axis keep turn", self.flow, "--for", "blender", "--up-axis", "z")
+        self.resample_fails("--up-axis keep ParaView", self.flow, "--for", "paraview", "--up-axis", "y")
+        self.resample_fails("--for blender houdini paraview", self.flow, "--for", "maya")
+        self.resample_fails("--voxel-shift", self.flow, "--voxel-shift", "2")
+        self.resample_fails("density", self.flow, "--for", "blender", "--field", "p=density,T=density")
+
+    def test_without_it_nothing_changes(self):
+        self.succeed("resample", self.flow, "-o", "a.vdb", "--quiet")
+        self.succeed("resample", self.flow, "-o", "b.vdb", "--quiet", "--layout", "levels", "--up-axis", "keep", "--voxel-shift", "0")
+        self.assertEqual((self.folder / "a.vdb").read_bytes(), (self.folder / "b.vdb").read_bytes())
+
+    def test_a_lattice_like_a_shifted_one_is_not_shifted(self):
+        self.succeed("resample", self.flow, "-o", "a.vdb", "--for", "blender", "--refine", "uniform", "--spacing", "0.07", "--quiet")
+        origin = self.info("--refine", "uniform", "--like", "a.vdb")["lattice"]["origin"]
+        for a, b in zip(self.report("info", "a.vdb")["lattice"]["origin"], origin):
+            self.assertAlmostEqual((a - b) / 0.07, round((a - b) / 0.07), places=9)
+
+
 class Slices(AppTest):
     """tessera slice."""
 
@@ -653,7 +716,7 @@ class Slices(AppTest):
     def test_header_holds_every_channel_and_attribute(self):
         self.succeed("slice", self.stokes, "-o", "cut.exr", "--normal", "1,1,1", "--resolution", "100", "--quiet")
         header = (self.folder / "cut.exr").read_bytes()[:4000]
-        for name in (b"pressure", b"velocity.x", b"velocity.y", b"velocity.z", b"coverage"):
+        for name in (b"pressure", b"velocity_x", b"velocity_y", b"velocity_z", b"coverage", b"R", b"G", b"B", b"A"):
             self.assertIn(b"\0" + name + b"\0", header)
         for name in (b"Origin\0v3d", b"U\0v3d", b"V\0v3d", b"Normal\0v3d", b"Spacing\0double", b"Source\0string", b"Algorithm\0string", b"Version\0string"):
             self.assertIn(b"tessera" + name + b"\0", header)
@@ -666,7 +729,7 @@ class Slices(AppTest):
             self.skipTest("exrheader is not installed")
         self.succeed("slice", self.stokes, "-o", "cut.exr", "--normal", "1,1,1", "--resolution", "100", "--quiet")
         text = subprocess.run([program, "cut.exr"], capture_output=True, text=True, cwd=self.folder, check=True).stdout
-        for word in ("velocity.x", "32-bit floating-point", "tesseraSpacing", "coverage", "stokes_p1.vtu"):
+        for word in ("velocity_x", "32-bit floating-point", "tesseraSpacing", "coverage", "stokes_p1.vtu"):
             self.assertIn(word, text)
 
     def test_png_shows_one_field(self):
@@ -674,7 +737,7 @@ class Slices(AppTest):
         self.assertTrue((self.folder / "cut.PNG").read_bytes().startswith(b"\x89PNG\r\n"))
         self.assertEqual([c["name"] for c in report["image"]["channels"]], ["|velocity|"])
         report = self.slice(self.stokes, "-o", "cut.png", "--field", "velocity", "--component", "2", "--range", "0,1", "--resolution", "100")
-        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["velocity.z"])
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["velocity_z"])
 
     def test_size_shows_a_part(self):
         options = ("--normal", "0,0,1", "--origin", "0.25,0.5,0.5", "--size", "0.5,0.25", "--resolution", "64")
@@ -705,10 +768,10 @@ class Slices(AppTest):
         self.assertEqual(self.slice("bare.vtu", "-o", "cut.exr")["image"]["channels"], [])
         self.reject_slice("no field", mesh="bare.vtu", output="cut.png")
 
-    def test_field_named_coverage_gets_another_name(self):
-        self.write("clash.vtu", vtu_text(fields={"coverage": range(8)}))
+    def test_fields_that_would_clash_get_another_name(self):
+        self.write("clash.vtu", vtu_text(fields={"coverage": range(8), "A": range(8), "Power": range(8), "a.b": range(8)}))
         report = self.slice("clash.vtu", "-o", "cut.exr")
-        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["coverage_"])
+        self.assertEqual([c["name"] for c in report["image"]["channels"]], ["coverage_", "A_", "Power_", "a_b"])
 
     def test_bad_input_says_what_is_wrong(self):
         self.reject_slice("normal zero", "--normal", "0,0,0")

@@ -67,8 +67,8 @@ std::string bytesOf(const std::string& path) {
 }
 
 ExrImage smallImage() {
-    ExrImage image{37, 21, {}, {}};
-    for (const char* name : {"p", "U.x", "U.y", "coverage"}) {
+    ExrImage image{37, 21, {}, {}, {}};
+    for (const char* name : {"p", "U_x", "U_y", "coverage"}) {
         ExrChannel channel{name, {}};
         for (int i = 0; i < 37 * 21; ++i)
             channel.values.push_back(float(std::sin(i * 0.1 * double(1 + image.channels.size()))) * 1e-30f);
@@ -103,17 +103,51 @@ TEST(ImageExr, GivesBackEveryBitAndAttribute) {
               Imath::V3d(0.1, 1e-300, -3));
 }
 
-TEST(ImageExr, ComponentsOfAFieldAreALayer) {
+// With layers Blender 3.4 takes a file for several pictures of no size.
+TEST(ImageExr, NoFieldMakesALayer) {
+    EXPECT_EQ(exrChannelNames("p", 1), std::vector<std::string>{"p"});
+    EXPECT_EQ(exrChannelNames("U", 3), (std::vector<std::string>{"U_x", "U_y", "U_z"}));
+    EXPECT_EQ(exrChannelNames("S", 6).back(), "S_5");
     const TemporaryFolder folder;
     const std::string path = folder.file("picture.exr");
-    writeExr(path, smallImage(), {});
-    const ReadExr read = readExr(path);
+    ExrImage image{2, 2, {}, {}, {}};
+    for (const int components : {1, 2, 3, 6})
+        for (const std::string& name : exrChannelNames("a.b." + std::to_string(components), components))
+            image.channels.push_back({name, {1, 2, 3, 4}});
+    writeExr(path, image, {});
     std::set<std::string> layers;
-    read.header.channels().layers(layers);
-    EXPECT_EQ(layers, std::set<std::string>{"U"});
-    EXPECT_EQ(exrChannelNames("p", 1), std::vector<std::string>{"p"});
-    EXPECT_EQ(exrChannelNames("U", 3), (std::vector<std::string>{"U.x", "U.y", "U.z"}));
-    EXPECT_EQ(exrChannelNames("S", 6).back(), "S.5");
+    readExr(path).header.channels().layers(layers);
+    EXPECT_EQ(layers, std::set<std::string>{});
+}
+
+TEST(ImageExr, ShownChannelsAreWrittenAsRedGreenBlueAndAlphaToo) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("picture.exr");
+    ExrImage image = smallImage();
+    image.shown = {1, 0, kExrZeros, 3};
+    writeExr(path, image, {});
+    const ReadExr read = readExr(path);
+    ASSERT_EQ(read.channels.size(), 8u);
+    const auto bits = [](const std::vector<float>& values) {
+        return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+    };
+    EXPECT_EQ(bits(read.channels.at("R")), bits(image.channels[1].values));
+    EXPECT_EQ(bits(read.channels.at("G")), bits(image.channels[0].values));
+    EXPECT_EQ(read.channels.at("B"), std::vector<float>(37 * 21, 0.0f));
+    EXPECT_EQ(bits(read.channels.at("A")), bits(image.channels[3].values));
+    for (const ExrChannel& channel : image.channels)
+        EXPECT_EQ(bits(read.channels.at(channel.name)), bits(channel.values)) << channel.name;
+    image.channels[0].name = "G";
+    EXPECT_THROW(writeExr(path, image, {}), InputError);
+}
+
+TEST(ImageExr, NamesThatViewersTakeForColoursAreTold) {
+    for (const char* name :
+         {"R", "G", "B", "A", "Number", "Er", "NUMBER", "Tag", "Ab", "0a", "Red", "AR", "BA"})
+        EXPECT_EQ(isShownAsColour(name), std::string(name) != "Tag") << name;
+    for (const char* name :
+         {"", "p", "pressure", "U_x", "coverage", "Number_", "error", "Ta", "Rag", "Red_", "Y"})
+        EXPECT_FALSE(isShownAsColour(name)) << name;
 }
 
 TEST(ImageExr, SamePictureGivesTheSameBytes) {
@@ -125,7 +159,7 @@ TEST(ImageExr, SamePictureGivesTheSameBytes) {
 
 TEST(ImageExr, LongNamesAndNamesBeyondAsciiAreKept) {
     const TemporaryFolder folder;
-    ExrImage image{2, 2, {}, {}};
+    ExrImage image{2, 2, {}, {}, {}};
     for (const std::string& name : {std::string(200, 'n'), std::string("\xcf\x81 (kg/m3)")})
         image.channels.push_back({name, {1, 2, 3, 4}});
     writeExr(folder.file("names.exr"), image, {});
@@ -181,7 +215,7 @@ TEST(ImageExr, CutOfALinearFieldHoldsItsValues) {
     const Cut cut = planCut(mesh, PlaneQuery(mesh), options);
     const CutSamples samples =
         sampleCut(mesh, cut, std::vector<int>{0, 1}, findResampler("software"), {}, {});
-    ExrImage image{samples.width, samples.height, {}, {}};
+    ExrImage image{samples.width, samples.height, {}, {}, {}};
     image.channels.push_back({"coverage", {samples.coverage.begin(), samples.coverage.end()}});
     const std::vector<std::string> names{"f", "v.x", "v.y", "v.z"};
     for (std::size_t c = 0; c < names.size(); ++c) image.channels.push_back({names[c], samples.channels[c]});

@@ -365,6 +365,39 @@ TEST_F(VdbFileTest, UpAxisTurnsPlacesAndVectorsTogether) {
     }
 }
 
+// The transform alone moves, by a share of each level's voxel and before the axes are turned.
+TEST_F(VdbFileTest, VoxelShiftMovesTheTransformsOnly) {
+    for (UpAxis axis : {UpAxis::keep, UpAxis::y, UpAxis::z}) {
+        BrickResult plain = makeResult({1, 2, 3}, 0.5, 8, nestedLeaves(), 10);
+        BrickResult shifted = makeResult({1, 2, 3}, 0.5, 8, nestedLeaves(), 10);
+        const BrickTree tree = plain.tree;
+        VdbWriteOptions options;
+        options.upAxis = axis;
+        options.unitScale = 10;
+        writeVdb(file("plain.vdb"), kMixed, plain, nullptr, nullptr, options, {});
+        options.voxelShift = -0.5;
+        writeVdb(file("shifted.vdb"), kMixed, shifted, nullptr, nullptr, options, {});
+        for (int level : {0, 1, 3}) {
+            const std::string name = "T_level_" + std::to_string(level);
+            const auto before = findGrid<openvdb::FloatGrid>(file("plain.vdb"), name);
+            const auto after = findGrid<openvdb::FloatGrid>(file("shifted.vdb"), name);
+            EXPECT_EQ(before->activeVoxelCount(), after->activeVoxelCount());
+            const openvdb::Vec3d index(4, -7, 9), half(0.5, 0.5, 0.5);
+            for (int a = 0; a < 3; ++a)
+                EXPECT_NEAR(after->indexToWorld(index)[a], before->indexToWorld(index - half)[a], 1e-12);
+        }
+        const VdbFile read = readVdb(file("shifted.vdb"));
+        EXPECT_EQ(read.voxelShift, -0.5);
+        expectSameTree(read.tree, tree);
+        expectStored(read, 10, valueAt, coveredAt);
+        const FixedFrame like = readVdbLattice(file("shifted.vdb"));
+        EXPECT_EQ(like.originWorld, Vec3d(1, 2, 3));
+        EXPECT_EQ(like.spacingWorld, 0.5);
+        EXPECT_NE(readBytes(file("shifted.vdb")).find("tessera_voxel_shift"), std::string::npos);
+        EXPECT_EQ(readBytes(file("plain.vdb")).find("tessera_voxel_shift"), std::string::npos);
+    }
+}
+
 float smallIntegers(int level, const Vec3i& p, int channel) {
     return float(int(pointKey(level, p, channel) % 2001) - 1000);
 }

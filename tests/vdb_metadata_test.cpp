@@ -14,6 +14,7 @@ VdbMetadata someMetadata() {
     metadata.fields = {{"p", "pressure", "point", 1, 0}, {"U", "velocity", "cell", 3, 1}};
     metadata.tree = BrickTree({0.1, -2, 3e5}, 0.25, 16, {{0, {2, 0, -1}}, {1, {0, 0, -1}}, {3, {-7, 5, 0}}});
     metadata.boundsWorld = Box3d{{0, 0, 0}, {1, 2, 3}};
+    metadata.voxelShift = -0.5;
     metadata.report.nodes = 80;
     metadata.time = 0.1;
     return metadata;
@@ -46,6 +47,7 @@ TEST(VdbMetadata, ComesBack) {
     ASSERT_EQ(read.tree.leafCount(), 3u);
     EXPECT_EQ(read.tree.leaves()[2], (BrickKey{3, {-7, 5, 0}}));
     EXPECT_EQ(read.fields[1].firstChannel, 1);
+    EXPECT_EQ(read.voxelShift, -0.5);
     EXPECT_EQ(read.report.nodes, 80);
     EXPECT_EQ(entries.at("tessera_time"), "0.1");
     EXPECT_EQ(read.time, 0.1);
@@ -63,6 +65,8 @@ TEST(VdbMetadata, NumbersThatDoNotFitAreRefused) {
     expectRefused(bricks, "[[2,", "[[18446744073709551615,", "a brick index");
     expectRefused(bricks, "\"spacing\":0.25", "\"spacing\":1e308", "coarsest level");
     expectRefused(bricks, "\"brick_cells\":16", "\"brick_cells\":4294967312", "brick_cells");
+    for (const char* shift : {"nan", "inf", "2", "half"})
+        expectRefused("tessera_voxel_shift", "-0.5", shift, "tessera_voxel_shift");
     // 2^32 + 3 would wrap to 3.
     expectRefused("tessera_fields", "\"components\":3", "\"components\":4294967299", "components");
     expectRefused("tessera_fields", "\"first_channel\":1", "\"first_channel\":4294967297", "first_channel");

@@ -60,6 +60,9 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
     if (!file.sampleFormat.empty()) text += fmt::format("  sampled in format {}\n", file.sampleFormat);
     if (!file.repair.empty()) text += fmt::format("  from a mesh that was repaired: {}\n", file.repair);
     if (file.time) text += fmt::format("  time {}\n", *file.time);
+    if (file.voxelShift != 0)
+        text +=
+            fmt::format("  the grids are shifted by {:.9g} of a voxel along x, y and z\n", file.voxelShift);
     if (file.boundsWorld) {
         const Box3d& b = *file.boundsWorld;
         text += fmt::format("  bounds ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})\n", b.min.x,
@@ -77,6 +80,7 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
     json["criterion"] = file.criterion;
     json["layout"] = file.layout == VdbLayout::flat ? "flat" : "levels";
     json["unit_scale"] = file.unitScale;
+    if (file.voxelShift != 0) json["voxel_shift"] = file.voxelShift;
     if (const auto& b = file.boundsWorld)
         json["bounds"] = {{b->min.x, b->min.y, b->min.z}, {b->max.x, b->max.y, b->max.z}};
     json["grids"] = gridsJson(file);

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "program_presets.h"
 #include "resample/cut_plane.h"
 
 namespace tessera {
@@ -200,10 +201,17 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
     const std::string group = "What to write";
     command.add_option("--field", a.fields, "fields to sample: a,b=newname,... (default: all)")->group(group);
     command
+        .add_option(
+            "--for", a.program,
+            "the program that will read the file: sets --layout, --up-axis, --extend and --voxel-shift, "
+            "and gives grids the names that it looks for, unless these are given too")
+        ->check(CLI::IsMember(programNames()))
+        ->group(group);
+    command
         .add_option("--layout", a.layout,
-                    "levels: one grid a field and level. flat: one grid a field at the finest spacing")
+                    "levels: one grid a field and level. flat: one grid a field at the finest spacing "
+                    "(default: levels)")
         ->check(CLI::IsMember({"levels", "flat"}))
-        ->capture_default_str()
         ->group(group);
     command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
     command
@@ -222,9 +230,14 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
         ->group(group);
     command
         .add_option("--up-axis", a.upAxis,
-                    "turn the grid so that this axis of the file points up: keep, y or z")
+                    "turn the grid so that this axis of the file points up: keep, y or z (default: keep)")
         ->check(CLI::IsMember({"keep", "y", "z"}))
-        ->capture_default_str()
+        ->group(group);
+    command
+        .add_option(
+            "--voxel-shift", a.voxelShift,
+            "share of a voxel by which the file places every voxel beside its sample, along x, y and z, for "
+            "programs that draw it elsewhere (default: 0)")
         ->group(group);
     addTimeStep(command, a.timeStep)->group(group);
 }
@@ -251,6 +264,7 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
   tessera resample flow.vtu -o flow.vdb
   tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
   tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
+  tessera resample flow.vtu -o flow.vdb --for blender --refine error --max-error 2%
   tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
   tessera resample run_*.vtu -o out_%04d.vdb --json report.json
   tessera resample run.pvd -o 'out_####.vdb' --times 0.5:2)");

@@ -13,6 +13,7 @@
 #include "memory_plan.h"
 #include "output_paths.h"
 #include "predict_cost.h"
+#include "program_presets.h"
 #include "registry/registry.h"
 #include "report_text.h"
 #include "series_steps.h"
@@ -203,11 +204,13 @@ Json ResampleRun::runStep(const Step& step) {
     Timer timer;
     const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
-    const FieldSelection selection = selectFields(file.mesh, settings_.fields);
+    FieldSelection selection = selectFields(file.mesh, settings_.fields);
+    const std::string names = nameFields(selection.outputs, settings_.fields, arguments_.program);
     checkOutputFields(selection.outputs);
     const RefineOptions options = stepOptions(file.mesh, selection);
     session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()) +
-                   (step.source.time ? fmt::format("  time {}\n", *step.source.time) : std::string()));
+                   (step.source.time ? fmt::format("  time {}\n", *step.source.time) : std::string()) +
+                   names);
     showRepair(step.input, file, repair_, session_);
 
     Json report{{"schema", 1},
@@ -223,6 +226,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"layout", arguments_.layout},
                 {"threads", session_.execution.threadCount()}};
     if (isSeries_) report.update(stepJson(step.source));
+    if (!arguments_.program.empty()) report["for"] = arguments_.program;
     Json rest = arguments_.dryRun ? dryRun(step, file, selection, options, times)
                                   : sampleAndWrite(step, file, selection, options, times);
     report["stages"] = stagesJson(times);
@@ -370,7 +374,8 @@ void ResampleRun::printResult(const Step& step, const BrickResult& result,
 }  // namespace
 
 int runResample(const ResampleArguments& arguments) {
-    return ResampleRun(arguments).run();
+    const ResampleArguments settled = settleProgram(arguments);
+    return ResampleRun(settled).run();
 }
 
 }  // namespace tessera

@@ -132,12 +132,13 @@ void SliceRun::checkUsage() const {
         checkWritable(arguments_.common.jsonPath);
 }
 
-/// Every chosen field, with names that no other channel has.
+/// Every chosen field, with names that no other channel has and no viewer takes for a colour.
 void SliceRun::selectAll() {
     std::set<std::string> taken{kCoverageName};
+    const auto isTaken = [&](const auto& n) { return taken.contains(n) || isShownAsColour(n); };
     for (OutputField& field : selection_.outputs) {
         std::vector<std::string> names = exrChannelNames(field.name, field.components);
-        while (std::any_of(names.begin(), names.end(), [&](const auto& n) { return taken.contains(n); })) {
+        while (std::any_of(names.begin(), names.end(), isTaken)) {
             field.name += "_";
             names = exrChannelNames(field.name, field.components);
         }
@@ -198,8 +199,23 @@ std::vector<ExrAttribute> SliceRun::attributes() const {
     return all;
 }
 
+/// R, G, B and A of channels that end with the coverage: the first field, one component as grey, two or three
+/// as they are, of more the first three. Without a field the coverage.
+std::vector<int> shownChannels(const FieldSelection& selection) {
+    const int coverage = selection.channels;
+    if (selection.outputs.empty()) return {coverage, coverage, coverage, coverage};
+    switch (selection.outputs.front().components) {
+        case 1:
+            return {0, 0, 0, coverage};
+        case 2:
+            return {0, 1, kExrZeros, coverage};
+        default:
+            return {0, 1, 2, coverage};
+    }
+}
+
 void SliceRun::writeExrFile() {
-    ExrImage image{samples_.width, samples_.height, {}, attributes()};
+    ExrImage image{samples_.width, samples_.height, {}, attributes(), shownChannels(selection_)};
     for (std::size_t c = 0; c < channelNames_.size(); ++c) {
         ranges_.push_back(shownRange(samples_.channels[c], samples_.coverage));
         image.channels.push_back({channelNames_[c], std::move(samples_.channels[c])});

@@ -64,6 +64,9 @@ void checkRanges(const ResampleArguments& a) {
     if (a.extendLayers)
         require(*a.extendLayers >= 0 && *a.extendLayers <= kLargestExtend,
                 fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, *a.extendLayers));
+    if (a.voxelShift)
+        require(std::abs(*a.voxelShift) <= 1,
+                fmt::format("--voxel-shift: expected -1 to 1, got {}", *a.voxelShift));
     const double largest = a.half ? kLargestHalf : double(std::numeric_limits<float>::max());
     require(std::abs(a.background) <= largest,
             fmt::format("--background: expected a number within {:.9g}, the largest of {}-bit floats, got {}",
@@ -140,6 +143,7 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.write.halfFloat = a.half;
     s.write.background = float(a.background);
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
+    s.write.voxelShift = a.voxelShift.value_or(0);
     s.write.unitScale = a.unitScale.value_or(0);
     s.shape.layout = s.write.layout;
     s.shape.layers = a.extendLayers.value_or(s.write.layout == VdbLayout::flat ? 1 : 0);
@@ -181,7 +185,8 @@ std::vector<FieldChoice> parseFields(const std::string& text) {
     for (const std::string& part : split(text, ',')) {
         const std::size_t equals = part.find('=');
         FieldChoice choice{part.substr(0, equals),
-                           equals == std::string::npos ? part : part.substr(equals + 1)};
+                           equals == std::string::npos ? part : part.substr(equals + 1),
+                           equals != std::string::npos};
         if (choice.source.empty() || choice.name.empty())
             throw InputError(fmt::format("--field: expected a,b=newname,..., got '{}'", text));
         if (!names.insert(choice.name).second)

@@ -32,6 +32,7 @@ struct CommonOptions {
 struct FieldChoice {
     std::string source;
     std::string name;
+    bool named = false;  ///< the name was given
 };
 
 /// The resampler and what it runs with, as typed.
@@ -53,7 +54,10 @@ struct ResampleArguments {
     CommonOptions common;
     std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
     std::string output, times;        ///< times: "a:b"; empty: all
-    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max";
+    std::string refine = "element-size", errorMeasure = "max";
+    std::string program;         ///< of --for; empty: none
+    std::string layout, upAxis;  ///< empty until settleProgram: not given
+    std::optional<double> voxelShift;
     AlgorithmArguments algorithm;
     RepairArguments repair;
     std::optional<int> resolution, maxLevels;

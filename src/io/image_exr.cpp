@@ -12,6 +12,7 @@
 #include <OpenEXR/ImfVecAttribute.h>
 
 #include <algorithm>
+#include <array>
 #include <set>
 
 #include "base/error.h"
@@ -23,6 +24,7 @@ namespace {
 
 constexpr std::size_t kLongestName = 255;  // the format's own bound
 constexpr int kRowsAtOnce = 16;            // what is compressed together
+constexpr std::array kShownNames{"R", "G", "B", "A"};
 
 /// OpenEXR's output side over an AtomicFile.
 class AtomicExrStream : public Imf::OStream {
@@ -43,7 +45,10 @@ class AtomicExrStream : public Imf::OStream {
 void checkImage(const ExrImage& image) {
     const std::size_t pixels = std::size_t(image.width) * std::size_t(image.height);
     TESSERA_CHECK(image.width > 0 && image.height > 0, "a picture has pixels");
+    TESSERA_CHECK(image.shown.empty() || image.shown.size() == kShownNames.size(),
+                  "four channels are shown, or none");
     std::set<std::string> names;
+    if (!image.shown.empty()) names.insert(kShownNames.begin(), kShownNames.end());
     for (const ExrChannel& channel : image.channels) {
         TESSERA_CHECK(channel.values.size() == pixels, "a channel has a value for every pixel");
         if (channel.name.empty() || channel.name.size() > kLongestName ||
@@ -68,11 +73,22 @@ void addAttribute(Imf::Header& header, const ExrAttribute& attribute) {
 }  // namespace
 
 std::vector<std::string> exrChannelNames(const std::string& field, int components) {
-    if (components == 1) return {field};
+    std::string base = field;
+    std::replace(base.begin(), base.end(), '.', '_');
+    if (components == 1) return {base};
     std::vector<std::string> names;
     for (int c = 0; c < components; ++c)
-        names.push_back(field + '.' + (components <= 3 ? std::string(1, "xyz"[c]) : std::to_string(c)));
+        names.push_back(base + '_' + (components <= 3 ? std::string(1, "xyz"[c]) : std::to_string(c)));
     return names;
+}
+
+bool isShownAsColour(const std::string& channel) {
+    for (const char* name : {"Red", "Green", "Blue", "AR", "RA", "AG", "GA", "AB", "BA"})
+        if (channel == name) return true;
+    if (channel.empty()) return false;
+    const char last = char(std::toupper(static_cast<unsigned char>(channel.back())));
+    // Channels stand in the order of their names.
+    return std::string("RGBA").find(last) != std::string::npos && channel <= std::string(1, last);
 }
 
 void writeExr(const std::string& path, const ExrImage& image, const Execution& execution) {
@@ -83,12 +99,19 @@ void writeExr(const std::string& path, const ExrImage& image, const Execution& e
         header.compression() = Imf::ZIP_COMPRESSION;
         for (const ExrAttribute& attribute : image.attributes) addAttribute(header, attribute);
         Imf::FrameBuffer pixels;
-        for (const ExrChannel& channel : image.channels) {
-            header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
+        const auto add = [&](const std::string& name, const ExrChannel& channel) {
+            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
             // The library's slices are read from here on, whatever their type says.
             char* values = const_cast<char*>(reinterpret_cast<const char*>(channel.values.data()));
-            pixels.insert(channel.name, Imf::Slice(Imf::FLOAT, values, sizeof(float),
-                                                   sizeof(float) * std::size_t(image.width)));
+            pixels.insert(name, Imf::Slice(Imf::FLOAT, values, sizeof(float),
+                                           sizeof(float) * std::size_t(image.width)));
+        };
+        for (const ExrChannel& channel : image.channels) add(channel.name, channel);
+        for (std::size_t c = 0; c < image.shown.size(); ++c) {
+            if (image.shown[c] != kExrZeros)
+                add(kShownNames[c], image.channels.at(std::size_t(image.shown[c])));
+            else  // the library writes zeros for a channel without pixels
+                header.channels().insert(kShownNames[c], Imf::Channel(Imf::FLOAT));
         }
         AtomicExrStream stream(file);
         Imf::OutputFile output(stream, header);

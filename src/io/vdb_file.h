@@ -37,6 +37,8 @@ struct VdbWriteOptions {
     UpAxis upAxis = UpAxis::keep;
     double unitScale =
         0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
+    double voxelShift =
+        0;  ///< the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
     std::string algorithm, criterion, sourceFile;
@@ -89,8 +91,8 @@ struct VdbFile {
     std::optional<double> time;                ///< as in VdbWriteOptions
     double unitScale = 1;
     UpAxis upAxis = UpAxis::keep;
-    double voxelShift = 0;             ///< of the grids' places, in voxels of each along the mesh's axes
-    bool halfFloat = false;            ///< values were rounded to half floats
+    double voxelShift = 0;   ///< as in VdbWriteOptions; `tree` has the places of the samples themselves
+    bool halfFloat = false;  ///< values were rounded to half floats
     std::optional<Box3d> boundsWorld;  ///< the box that was asked for: no error was measured outside it
     float background = 0;
     int flatLevel = 0;  ///< flat: of `bricks`, the level whose spacing the grids have

@@ -244,6 +244,7 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_criterion"] = metadata.criterion;
     entries["tessera_layout"] = choiceName(metadata.layout, kLayouts);
     entries["tessera_up_axis"] = choiceName(metadata.upAxis, kUpAxes);
+    if (metadata.voxelShift != 0) entries["tessera_voxel_shift"] = exactText(metadata.voxelShift);
     entries["tessera_unit_scale"] = exactText(metadata.unitScale);
     entries["tessera_spacing"] = exactText(metadata.tree.spacingWorld(0));
     entries["tessera_precision"] = metadata.halfFloat ? "half" : "float";
@@ -280,6 +281,10 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     }
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
+    if (const auto shift = entries.find("tessera_voxel_shift"); shift != entries.end()) {
+        metadata.voxelShift = readDouble(shift->second, shift->first);
+        if (!(std::abs(metadata.voxelShift) <= 1)) damaged("tessera_voxel_shift is out of range");
+    }
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");
     metadata.halfFloat = entry(entries, "tessera_precision") == "half";
     metadata.background = float(readDouble(entry(entries, "tessera_background"), "tessera_background"));

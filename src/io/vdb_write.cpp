@@ -41,11 +41,18 @@ openvdb::Vec3f turned(const openvdb::Vec3f& v, UpAxis upAxis) {
     return v;
 }
 
+// Where a grid's transform places voxel (0, 0, 0), in the mesh's axes and unit.
+Vec3d gridOriginWorld(const BrickTree& tree, int level, double voxelShift) {
+    if (voxelShift == 0) return tree.originWorld();  // keeps the sign of a zero
+    return tree.originWorld() + Vec3d(voxelShift * tree.spacingWorld(level));
+}
+
 openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, double unitScale,
-                                            UpAxis upAxis) {
+                                            const VdbWriteOptions& options) {
     namespace math = openvdb::math;
-    const Vec3d origin = tree.originWorld() * unitScale;
+    const Vec3d origin = gridOriginWorld(tree, level, options.voxelShift) * unitScale;
     const double spacing = tree.spacingWorld(level) * unitScale;
+    const UpAxis upAxis = options.upAxis;
     if (upAxis == UpAxis::keep) {
         const math::MapBase::Ptr map(
             new math::UniformScaleTranslateMap(spacing, {origin.x, origin.y, origin.z}));
@@ -328,9 +335,9 @@ std::vector<bool> choosePrecision(const std::vector<OutputField>& fields, const 
 }
 
 void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickTree& tree, int level,
-                  double unitScale, UpAxis upAxis) {
+                  double unitScale, const VdbWriteOptions& options) {
     grid.setName(name);
-    grid.setTransform(makeTransform(tree, level, unitScale, upAxis));
+    grid.setTransform(makeTransform(tree, level, unitScale, options));
     grid.insertMeta("tessera_spacing", openvdb::StringMetadata(exactText(tree.spacingWorld(level))));
     grid.insertMeta("tessera_unit_scale", openvdb::StringMetadata(exactText(unitScale)));
 }
@@ -347,7 +354,7 @@ openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const st
             openvdb::GridBase& grid = *grids.builders[p]->grid();
             const std::string base = coverage ? "coverage" : plans[p].name;
             describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
-                         options.upAxis);
+                         options);
             grid.insertMeta("tessera_level", openvdb::Int32Metadata(grids.level + flatLevel));
             grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
             if (!coverage)
@@ -450,6 +457,7 @@ VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResu
     metadata.time = options.time;
     metadata.unitScale = written.unitScale;
     metadata.upAxis = options.upAxis;
+    metadata.voxelShift = options.voxelShift;
     metadata.halfFloat = options.halfFloat;
     metadata.background = options.background;
     metadata.boundsWorld = options.boundsWorld;
@@ -465,7 +473,7 @@ double placeErrorVoxels(const BrickTree& tree, const VdbWriteOptions& options, d
     const double spacing = tree.spacingWorld(0) * unitScale;
     double worst = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        const double origin = tree.originWorld()[axis] * unitScale;
+        const double origin = gridOriginWorld(tree, 0, options.voxelShift)[axis] * unitScale;
         double furthest = 1;
         for (const BrickKey& leaf : tree.leaves())
             furthest = std::max(furthest,
