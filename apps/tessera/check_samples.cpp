@@ -222,7 +222,7 @@ SampleCheck checkSamples(const TetMesh& mesh, std::span<const int> fields, const
     const std::int64_t stride = std::max<std::int64_t>(1, stored / samples) | 1;
     for (std::int64_t i = stride / 2; i < stored; i += stride) {
         execution.throwIfCancelled();
-        execution.report("samples", i, stored);
+        execution.report(Stage::comparing, i, stored);
         const std::int64_t rest = i % (edge * edge * edge);
         checker.check(std::size_t(i / (edge * edge * edge)),
                       {int(rest % edge), int(rest / edge % edge), int(rest / (edge * edge))}, result);

@@ -105,6 +105,7 @@ int runInfo(const InfoArguments& arguments) {
     if (arguments.path.empty() && !arguments.gl) throw InputError("info needs a file, or --gl");
     checkOutputPaths({arguments.path}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
+    session.progress.declare({{Stage::reading, 1}, {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0}});
     Json json = documentHead(arguments.path);
     if (!arguments.path.empty()) {
         const bool isVdb = std::filesystem::path(arguments.path).extension() == ".vdb";

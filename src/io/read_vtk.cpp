@@ -18,9 +18,12 @@
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
+#include <map>
+#include <memory>
 #include <new>
 
 #include "base/error.h"
+#include "io/name_list.h"
 #include "io/vtk_convert.h"
 #include "io/vtk_messages.h"
 #include "io/vtk_source.h"
@@ -33,12 +36,12 @@ namespace {
 struct XmlReaderKind {
     const char* type;         // attribute of <VTKFile>
     const char* description;  // for the user
-    vtkSmartPointer<vtkXMLReader> (*make)();
+    vtkSmartPointer<vtkXMLReader> (*make)(const std::shared_ptr<RenamedFields>& renamed);
 };
 
 template <class Reader>
-vtkSmartPointer<vtkXMLReader> makeXmlReader() {
-    return vtkSmartPointer<Reader>::New();
+vtkSmartPointer<vtkXMLReader> makeXmlReader(const std::shared_ptr<RenamedFields>& renamed) {
+    return UniqueNames<Reader>::create(renamed);
 }
 
 const XmlReaderKind kXmlReaders[] = {
@@ -68,9 +71,10 @@ void selectArrays(vtkDataArraySelection* selection, FieldLocation location, cons
 VtkSource openXml(const std::string& path, const DeclaredSize& info) {
     for (const XmlReaderKind& kind : kXmlReaders) {
         if (info.type != kind.type) continue;
-        auto reader = kind.make();
+        const auto renamed = std::make_shared<RenamedFields>();
+        auto reader = kind.make(renamed);
         reader->SetFileName(path.c_str());
-        return {reader, kind.description};
+        return {reader, kind.description, {}, {}, renamed};
     }
     throw InputError(
         path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
@@ -116,6 +120,24 @@ void throwOnErrors(const std::string& path, const VtkMessages& messages) {
     if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
 }
 
+/// A reader may say the same for every cell.
+void addVtkWarnings(const std::vector<std::string>& all, ImportStatistics& statistics) {
+    std::map<std::string, int> counts;
+    for (const std::string& warning : all) ++counts[warning];
+    for (const auto& [warning, count] : counts)
+        statistics.warnings.push_back("VTK: " + warning +
+                                      (count > 1 ? " (" + std::to_string(count) + " times)" : ""));
+}
+
+/// Nothing of what a file holds changes its name without a word.
+void warnOfRenamed(const RenamedFields& renamed, ImportStatistics& statistics) {
+    if (renamed.names.empty()) return;
+    statistics.warnings.push_back(
+        (renamed.names.size() == 1 ? "More than one field is" : "Fields are") + std::string(" called ") +
+        nameList(renamed.names) + "; those behind the first are called " + nameList(renamed.newNames) +
+        " here.");
+}
+
 void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObject* data) {
     if (info.type != "UnstructuredGrid") return;
     const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
@@ -150,10 +172,10 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     if (format == VtkFormat::xml) checkCounts(path, info, data);
     raw.statistics.format = opened.format;
     raw.statistics.warnings = opened.warnings;
+    if (opened.renamed) warnOfRenamed(*opened.renamed, raw.statistics);
     appendVtkData(path, data, opened.nodeIds, options, execution, raw);
     throwOnErrors(path, messages);
-    for (const std::string& warning : messages.warnings())
-        raw.statistics.warnings.push_back("VTK: " + warning);
+    addVtkWarnings(messages.warnings(), raw.statistics);
     if (!raw.blocks.empty())
         raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
     return raw;
