@@ -1105,8 +1105,8 @@ class Terminal(AppTest):
         return lines
 
     def test_progress_is_one_line_that_never_goes_back(self):
-        options = ["--refine", "error", "--max-error", "0.02%", "--brick-size", "8", "--max-voxels", "8M", "--threads", "1"]
-        for columns in (80, 120, 50):
+        options = ["--refine", "error", "--max-error", "0.02%", "--brick-size", "8", "--max-voxels", "4M", "--threads", "1"]
+        for columns in (80, 50):
             code, output, sent = self.on_a_terminal("resample", self.stokes, "-o", "out.vdb", *options, columns=columns)
             self.assertEqual(code, 0, sent)
             lines = self.lines_drawn(sent, columns)
@@ -1115,18 +1115,18 @@ class Terminal(AppTest):
             # Whatever is printed stands on a line of its own.
             rest = re.sub("\r[^\r\n\x1b]*\x1b\\[K", "", sent)
             for line in rest.splitlines():
-                self.assertRegex(line, "^(tessera: warning: .*)?$")
+                self.assertRegex(line, "^(tessera: warning:.*|    .*)?$")
             self.assertTrue(sent.endswith("\x1b[K") or sent.endswith("\n"), repr(sent[-80:]))
 
     def test_a_series_says_which_step(self):
-        for step in range(4):
+        for step in range(3):
             shutil.copy(self.stokes, self.folder / f"run_{step}.vtu")
         code, output, sent = self.on_a_terminal("resample", "run_*.vtu", "-o", "out_#.vdb", "--refine", "uniform", "--resolution", "150", "--threads", "1")
         self.assertEqual(code, 0, sent)
         lines = self.lines_drawn(sent, 80)
-        steps = [int(m[1]) for line in lines if (m := re.match(r"step (\d) of 4: ", line))]
+        steps = [int(m[1]) for line in lines if (m := re.match(r"step (\d) of 3: ", line))]
         self.assertEqual(steps, sorted(steps))
-        self.assertGreaterEqual(len(set(steps)), 3)
+        self.assertEqual(len(set(steps)), 3)
 
     def test_quiet_or_no_terminal_draws_nothing(self):
         code, output, sent = self.on_a_terminal("resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "150")
@@ -1152,8 +1152,8 @@ class Terminal(AppTest):
                 # Sentences are the terminal's to break; rows of tables have gaps between columns.
                 if re.search(r"\S  +\S", line):
                     self.assertLessEqual(len(line), 80, text)
-        for word in ("velocity_m...", "kkkkkk...kkkkk"):
-            self.assertTrue(any(word in text for text in texts), word)
+        self.assertRegex(texts[1], r"velocity_magnitude.*\.\.\..*averaged_over_time")
+        self.assertRegex(texts[1], r" kkk+\.\.\.kkk+ ")
 
     def test_help_fits_the_terminal(self):
         for command in ([], ["resample"], ["compare"]):

@@ -12,7 +12,7 @@ const std::vector<ExpectedStage> kStages{{Stage::reading, 1},  {Stage::planning,
                                          {Stage::checking, 2}, {Stage::measuring, 2}, {Stage::writing, 2}};
 
 /// Progress on a clock that the test moves.
-struct Run {
+struct TimedRun {
     double nowMs = 0;
     RunProgress progress{[this] { return nowMs; }};
     double share() { return progress.state().share; }
@@ -26,7 +26,7 @@ struct Run {
 };
 
 TEST(RunProgress, passesThroughTheDeclaredShares) {
-    Run run;
+    TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 2}, {Stage::writing, 1}});
     EXPECT_EQ(run.share(), 0);
     run.pass(Stage::reading, 10);
@@ -38,7 +38,7 @@ TEST(RunProgress, passesThroughTheDeclaredShares) {
 }
 
 TEST(RunProgress, aStageThatIsLeftOutGivesItsShareToTheOthers) {
-    Run run;
+    TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::repairing, 5}, {Stage::writing, 1}});
     run.pass(Stage::reading, 10);
     const double before = run.share();
@@ -49,7 +49,7 @@ TEST(RunProgress, aStageThatIsLeftOutGivesItsShareToTheOthers) {
 /// Whatever is expected of the rounds to come, the share never falls and ends at 1.
 TEST(RunProgress, neverGoesBackThroughRoundsThatWereExpectedWrongly) {
     for (const double expected : {0.0, 3.0, 500.0}) {
-        Run run;
+        TimedRun run;
         run.progress.declare(kStages);
         double last = 0;
         const auto check = [&] {
@@ -64,7 +64,8 @@ TEST(RunProgress, neverGoesBackThroughRoundsThatWereExpectedWrongly) {
         for (int round = 0; round < 6; ++round, bricks *= 3) {
             run.progress.beginRound(bricks, expected);
             for (const Stage stage : {Stage::sampling, Stage::checking})
-                for (int i = 0; i <= 20; ++i, run.nowMs += bricks / 10) run.progress.update(stage, i, 20), check();
+                for (int i = 0; i <= 20; ++i, run.nowMs += bricks / 10)
+                    run.progress.update(stage, i, 20), check();
         }
         run.pass(Stage::measuring, 100), check();
         EXPECT_LT(last, 1);
@@ -74,7 +75,7 @@ TEST(RunProgress, neverGoesBackThroughRoundsThatWereExpectedWrongly) {
 }
 
 TEST(RunProgress, growsWithTimeWhileAStageReportsNothing) {
-    Run run;
+    TimedRun run;
     run.progress.declare(kStages);
     run.progress.expect(Stage::reading, 1000);
     run.progress.update(Stage::reading, 0, 1);
@@ -88,7 +89,7 @@ TEST(RunProgress, growsWithTimeWhileAStageReportsNothing) {
 }
 
 TEST(RunProgress, tellsTheTimeLeftByWhatOthersTook) {
-    Run run;
+    TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 2}, {Stage::writing, 1}});
     run.pass(Stage::reading, 60000);
     EXPECT_LT(run.progress.state().leftMs, 0);  // reading says nothing about it
@@ -102,7 +103,7 @@ TEST(RunProgress, tellsTheTimeLeftByWhatOthersTook) {
 }
 
 TEST(RunProgress, aSeriesIsOneRun) {
-    Run run;
+    TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 3}});
     double last = 0;
     for (int step = 0; step < 4; ++step) {
@@ -113,13 +114,15 @@ TEST(RunProgress, aSeriesIsOneRun) {
             EXPECT_GE(run.share(), last);
             last = run.share();
         }
-        if (step == 1) EXPECT_NEAR(run.progress.state().leftMs, 4000, 1);
+        if (step == 1) {
+            EXPECT_NEAR(run.progress.state().leftMs, 4000, 1);
+        }
     }
     EXPECT_NEAR(last, 1, 1e-6);
 }
 
 TEST(RunProgress, takesReportsOfManyThreads) {
-    Run run;
+    TimedRun run;
     run.progress.declare({{Stage::sampling, 1}, {Stage::writing, 1}});
     std::atomic<std::int64_t> done{0};
     std::vector<std::thread> threads;

@@ -66,7 +66,7 @@ TEST(BundledData, CavityOfQuadraticTets) {
     EXPECT_EQ(file.statistics.higherOrderCells, 25535);
     EXPECT_EQ(file.statistics.cellsOfKind[std::size_t(CellKind::tet)], 25535);
     EXPECT_TRUE(file.statistics.warnings.empty());  // the count says it
-    EXPECT_LT(file.statistics.nodes, 35069);  // nodes in the middle of edges are gone
+    EXPECT_LT(file.statistics.nodes, 35069);        // nodes in the middle of edges are gone
     EXPECT_EQ(field(file, "S").components, 6);
     EXPECT_NEAR(sumOfVolumes(file.mesh), 999999.999, 1e-3);
     EXPECT_NEAR(file.statistics.smallestVolumeWorld, 4.5878e-08, 1e-12);

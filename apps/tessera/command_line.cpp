@@ -98,7 +98,8 @@ void addCommonOptions(CLI::App& command, CommonOptions& options) {
         .add_option("--threads", options.threads,
                     "worker threads (default: one for every processor); the result never depends on it")
         ->check(CLI::Range(0, 1024));
-    command.add_flag("-q,--quiet", options.quiet, "print nothing but errors, and a warning where a result isn't what was asked for");
+    command.add_flag("-q,--quiet", options.quiet,
+                     "print nothing but errors, and a warning where a result isn't what was asked for");
     command.add_option("--json", options.jsonPath,
                        "write a report as JSON to this file, or to standard output for -");
     addReaderOptions(command, options.reader);
@@ -240,9 +241,10 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     addAlgorithmOptions(command, a.algorithm);
     addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
-    command.add_flag("--strict", a.common.strict,
-                     "exit code 3 when a result isn't what was asked for (the error bound missed, a grid coarser "
-                     "than asked for); everything is written all the same");
+    command.add_flag(
+        "--strict", a.common.strict,
+        "exit code 3 when a result isn't what was asked for (the error bound missed, a grid coarser "
+        "than asked for); everything is written all the same");
     command.footer(R"(Examples:
   tessera resample flow.vtu -o flow.vdb
   tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
@@ -438,7 +440,8 @@ void describe(CLI::App& app, CommandLine& arguments) {
     app.footer(
         "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
         "codes: 0 done, "
-        "2 bad input or usage, 3 a result that isn't what was asked for (with --strict), 1 any other failure, "
+        "2 bad input or usage, 3 a result that isn't what was asked for (with --strict), 1 any other "
+        "failure, "
         "130 interrupted.");
     addResampleOptions(
         *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),

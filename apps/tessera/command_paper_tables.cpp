@@ -168,9 +168,9 @@ class PaperTables {
         for (std::size_t a = 0; a < bound.size(); ++a) {
             const Contestant& c = algorithms_[a];
             if (!isMeasured(c.label, grid)) continue;
-            measured[c.label] = {
-                std::string(bound[a]->target()),
-                timeRuns(*bound[a], sampling.lattice, boxes, arguments_.runs, session_.execution.withoutProgress())};
+            measured[c.label] = {std::string(bound[a]->target()),
+                                 timeRuns(*bound[a], sampling.lattice, boxes, arguments_.runs,
+                                          session_.execution.withoutProgress())};
         }
         addRows(grid, measured, tables);
         return gridJson(grid, measured);
@@ -181,8 +181,7 @@ class PaperTables {
         tables.here.push_back({formatGrid(grid.points)});
         tables.published.push_back({formatGrid(grid.points)});
         for (const PaperRow& row : paperRows(grid)) {
-            if (!row.algorithm.empty())
-                tables.here.push_back(ourCells(std::string(row.algorithm), measured));
+            if (!row.algorithm.empty()) tables.here.push_back(ourCells(std::string(row.algorithm), measured));
             if (!row.paperName.empty()) tables.published.push_back(paperCells(row, grid));
         }
     }

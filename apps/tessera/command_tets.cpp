@@ -14,9 +14,8 @@ int runTets(const TetsArguments& arguments) {
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     checkWritable(arguments.output);
-    session.progress.declare({{Stage::reading, 1},
-                              {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0},
-                              {Stage::writing, 1}});
+    session.progress.declare(
+        {{Stage::reading, 1}, {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0}, {Stage::writing, 1}});
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
     const ImportedMesh file = importMesh(arguments.input, {{}, arguments.timeStep}, repair, session);

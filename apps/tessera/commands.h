@@ -36,14 +36,15 @@ class Session {
     /// Prints one line to standard error, unless quiet.
     void warn(const std::string& text);
 
-    /// The result isn't what was asked for: one line on standard error, quiet or not, and what --strict is for.
+    /// The result isn't what was asked for: one line on standard error, quiet or not, and what --strict is
+    /// for.
     void warnFellShort(const std::string& text);
 
     /// What of an import's warnings wasn't said before, on another step of the series.
     std::vector<std::string> unsaid(const std::vector<std::string>& warnings);
 
-    /// Largest memory of the run: of this process, or, where that is more, of the one that read a mesh and this
-    /// one together at that time.
+    /// Largest memory of the run: of this process, or, where that is more, of the one that read a mesh and
+    /// this one together at that time.
     std::int64_t peakMemoryBytes() const;
 
     /// For a run that did all it was to do: 0, or with --strict 3 after warnFellShort.

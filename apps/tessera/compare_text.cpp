@@ -62,12 +62,13 @@ std::string differencesText(const CompareReport& report) {
                             number(d.rms), share(d.rms, d.range), number(d.maxInThickElements),
                             share(d.maxInThickElements, d.range)});
             if (d.points > 0 && d.max > 0) {
-                places += fmt::format("  {}, {}: largest at {}{}\n    world ({:.9g}, {:.9g}, {:.9g})\n", label,
-                                      d.name, point(d.worst),
-                                      d.worstElement < 0 ? std::string()
-                                                         : fmt::format(", element {}, {:.3g} voxel thick",
-                                                                       d.worstElement, d.worstThicknessVoxels),
-                                      d.worstWorld.x, d.worstWorld.y, d.worstWorld.z);
+                places +=
+                    fmt::format("  {}, {}: largest at {}{}\n    world ({:.9g}, {:.9g}, {:.9g})\n", label,
+                                d.name, point(d.worst),
+                                d.worstElement < 0 ? std::string()
+                                                   : fmt::format(", element {}, {:.3g} voxel thick",
+                                                                 d.worstElement, d.worstThicknessVoxels),
+                                d.worstWorld.x, d.worstWorld.y, d.worstWorld.z);
             }
             if (d.validityDiffers > 0)
                 places += fmt::format("  {}, {}: at {} points only one of the two is finite\n", label, d.name,

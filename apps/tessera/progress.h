@@ -47,8 +47,8 @@ class ProgressLine {
     std::thread drawer_;
 };
 
-/// Wipes the line where one is drawn, and keeps it away for as long as the result lives: to be held by whatever
-/// prints.
+/// Wipes the line where one is drawn, and keeps it away for as long as the result lives: to be held by
+/// whatever prints.
 std::unique_lock<std::mutex> pauseProgress();
 
 /// The line's text, at most width - 1 columns.

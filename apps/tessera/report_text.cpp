@@ -19,8 +19,8 @@ std::string percent(double share) {
     return fmt::format("{:.3g} %", share * 100);
 }
 
-std::string rangeText(const ValueRange& range) {
-    return range.empty() ? "no finite value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max);
+std::string endText(const ValueRange& range, double value) {
+    return range.empty() ? "no value" : fmt::format("{:.6g}", value);
 }
 
 void appendCount(std::string& text, std::int64_t count, const char* what) {
@@ -85,8 +85,8 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
     std::string text = fmt::format("{}: {}, {} cells, {} elements, {} nodes\n", path, s.format,
                                    formatCount(s.cells), formatCount(s.elements), formatCount(s.nodes));
     if (const std::string cells = cellsText(s); !cells.empty()) text += fmt::format("  {}\n", cells);
-    text += fmt::format("  bounds {} to {}\n  edges {:.4g} to {:.4g}\n", place(bounds.min),
-                        place(bounds.max), s.smallestEdgeWorld, s.largestEdgeWorld);
+    text += fmt::format("  bounds {} to {}\n  edges {:.4g} to {:.4g}\n", place(bounds.min), place(bounds.max),
+                        s.smallestEdgeWorld, s.largestEdgeWorld);
     std::string oddities;
     appendCount(oddities, s.skippedCells, "other cells skipped");
     appendCount(oddities, s.blankedCells, "blanked cells left out");
@@ -105,12 +105,13 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
 
 std::string fieldsText(const std::vector<FieldSummary>& fields) {
     // A line a component: nine ranges are wider than any terminal.
-    TableRows rows{{"field", "on", "components", "range"}};
+    TableRows rows{{"field", "on", "components", "from", "to"}};
     for (const FieldSummary& f : fields) {
         const std::string on = f.location == "point" ? "points" : "cells";
         for (std::size_t c = 0; c < f.ranges.size(); ++c)
             rows.push_back({c == 0 ? f.name : "", c == 0 ? on : "",
-                            c == 0 ? std::to_string(f.ranges.size()) : "", rangeText(f.ranges[c])});
+                            c == 0 ? std::to_string(f.ranges.size()) : "",
+                            endText(f.ranges[c], f.ranges[c].min), endText(f.ranges[c], f.ranges[c].max)});
     }
     return formatTable(rows);
 }
@@ -142,7 +143,8 @@ std::string countsByField(const ErrorReport& report, const Count& countOf) {
 
 std::string errorText(const ErrorReport& report) {
     const char* const share = "of range";
-    TableRows rows{{"error", "max", share, "99.9 %", share, "rms", share}}, places{{"largest error of", "at"}};
+    TableRows rows{{"error", "max", share, "99.9 %", share, "rms", share}},
+        places{{"largest error of", "at"}};
     std::vector<std::string> without;
     for (const FieldError& f : report.fields) {
         if (f.samples == 0) {
@@ -156,8 +158,7 @@ std::string errorText(const ErrorReport& report) {
         places.push_back({f.name, place(f.worstPlaceWorld)});
     }
     std::string text;
-    if (rows.size() > 1)
-        text += formatTable(rows, {.glued = share}) + formatTable(places);
+    if (rows.size() > 1) text += formatTable(rows, {.glued = share}) + formatTable(places);
     if (!without.empty())
         text += fmt::format("  without a finite value, so without an error: {}\n", nameList(without));
     text += fmt::format(
@@ -169,8 +170,7 @@ std::string errorText(const ErrorReport& report) {
     const std::string invalid = countsByField(report, [&](const FieldError& f) {
         return f.samples > 0 ? report.coveredPoints - f.validPoints : 0;
     });
-    if (!invalid.empty())
-        text += fmt::format("  voxels in the mesh without a finite value: {}\n", invalid);
+    if (!invalid.empty()) text += fmt::format("  voxels in the mesh without a finite value: {}\n", invalid);
     if (report.outsideBricks > 0)
         text += fmt::format("  {} samples lie outside the bounds and don't count\n",
                             formatCount(report.outsideBricks));
@@ -180,7 +180,7 @@ std::string errorText(const ErrorReport& report) {
 std::string stagesText(const StageTimes& t) {
     std::string text = fmt::format("  read {:.0f} ms, plan {:.0f} ms, resample {:.0f} ms, verify {:.0f} ms",
                                    t.readMs, t.planMs, t.resampleMs, t.verifyMs);
-    if (t.extendMs > 0) text += fmt::format(", extend {:.0f} ms", t.extendMs);
+    if (t.extendMs >= 0.5) text += fmt::format(", extend {:.0f} ms", t.extendMs);
     return text + fmt::format(", write {:.0f} ms\n", t.writeMs);
 }
 

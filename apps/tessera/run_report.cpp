@@ -24,9 +24,9 @@ Json rangeJson(const ValueRange& range) {
 
 Json cellTypesJson(const ImportStatistics& s) {
     const auto count = [&](CellKind kind) { return s.cellsOfKind[std::size_t(kind)]; };
-    return {{"tetrahedra", count(CellKind::tet)},    {"pyramids", count(CellKind::pyramid)},
-            {"wedges", count(CellKind::wedge)},      {"hexahedra", count(CellKind::hex)},
-            {"voxels", count(CellKind::voxel)},      {"polyhedra", count(CellKind::polyhedron)}};
+    return {{"tetrahedra", count(CellKind::tet)}, {"pyramids", count(CellKind::pyramid)},
+            {"wedges", count(CellKind::wedge)},   {"hexahedra", count(CellKind::hex)},
+            {"voxels", count(CellKind::voxel)},   {"polyhedra", count(CellKind::polyhedron)}};
 }
 
 Json fieldsJson(const std::vector<FieldSummary>& fields) {

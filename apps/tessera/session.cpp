@@ -96,8 +96,10 @@ int outputError() {
 
 namespace {
 void printWarning(const std::string& text) {
+    std::string line = fmt::format("tessera: warning: {}\n", singleLine(text));
+    if (::isatty(STDERR_FILENO) == 1) line = wrapLines(line, std::size_t(terminalWidth(STDERR_FILENO)));
     const auto pause = pauseProgress();
-    std::fputs(("tessera: warning: " + singleLine(text) + "\n").c_str(), stderr);
+    std::fputs(line.c_str(), stderr);
 }
 }  // namespace
 

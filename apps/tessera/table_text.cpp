@@ -87,7 +87,8 @@ class Table {
 
     std::string lineOf(const std::vector<std::string>& row, const std::vector<std::size_t>& part) const {
         std::string line;
-        for (const std::size_t c : allKeys()) line += std::string(kGap, ' ') + padded(row[c], widths_[c], true);
+        for (const std::size_t c : allKeys())
+            line += std::string(kGap, ' ') + padded(row[c], widths_[c], true);
         for (const std::size_t c : part)
             line += std::string(kGap, ' ') + padded(c < row.size() ? row[c] : "", widths_[c], false);
         line.erase(line.find_last_not_of(' ') + 1);

@@ -13,6 +13,7 @@ constexpr std::uint64_t kNoStage = std::uint64_t(0xff) << 32;
 constexpr double kUsualMs = 1500;  // of a stage of which nothing is known
 // A stage that reports nothing comes near this share of itself as time goes by.
 constexpr double kSilentShare = 0.9, kShareBeforeReports = 0.1;
+constexpr double kMostGuessed = 0.3;      // of rounds to come, over those that are known
 constexpr double kFirstEstimateMs = 500;  // time that has to be measured before it tells anything
 
 std::uint64_t packed(Stage stage, float fraction) {
@@ -78,8 +79,7 @@ void RunProgress::update(Stage stage, std::int64_t done, std::int64_t total) {
         return;
     }
     // Threads overtake each other.
-    if (part > fractionIn(before) || part == 0)
-        latest_.store(packed(stage, part), std::memory_order_relaxed);
+    if (part > fractionIn(before) || part == 0) latest_.store(packed(stage, part), std::memory_order_relaxed);
 }
 
 void RunProgress::beginRound(double now, double later) {
@@ -175,7 +175,8 @@ double RunProgress::msPerUnit(double nowMs, double part) const {
 /// Below 0 when it isn't known.
 double RunProgress::leftInStepMs(double nowMs, double part) const {
     const double perUnit = msPerUnit(nowMs, part);
-    if (perUnit < 0) return -1;
+    // Rounds that outweigh what is done are a guess that may be far off.
+    if (perUnit < 0 || roundLater_ > kMostGuessed * roundTotal_) return -1;
     return perUnit * (stageUnits_ * (1 - part) + unitsAfter(position_));
 }
 

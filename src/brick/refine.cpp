@@ -264,15 +264,13 @@ void ErrorRefinement::measureChanged() {
     const auto count = std::int64_t(leaves_.size());
     std::atomic<std::int64_t> done{0};
     execution_.report(Stage::checking, 0, count);
-    parallelForChunks(execution_, count, kChunk,
-                      [&](std::int64_t begin, std::int64_t end) {
-                          LeafSampler sampler(samples_, tree_, store_, reconstruction);
-                          for (std::int64_t i = begin; i < end; ++i)
-                              if (touchesFresh(std::size_t(i)))
-                                  leaves_[std::size_t(i)]->ratio =
-                                      leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
-                          execution_.report(Stage::checking, done += end - begin, count);
-                      });
+    parallelForChunks(execution_, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        LeafSampler sampler(samples_, tree_, store_, reconstruction);
+        for (std::int64_t i = begin; i < end; ++i)
+            if (touchesFresh(std::size_t(i)))
+                leaves_[std::size_t(i)]->ratio = leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
+        execution_.report(Stage::checking, done += end - begin, count);
+    });
     times_.verifyMs += timer.elapsedMs();
 }
 
@@ -412,6 +410,7 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
                               const RefineOptions& options, const Execution& execution) {
     Timer timer;
     if (options.criterion == Criterion::error) {
+        execution.report(Stage::planning, 0, 1);
         checkOptions(mesh, meshBounds(mesh, execution), options);
         ErrorRefinement refinement(mesh, fields, resampler, options, execution);
         const double setupMs = timer.elapsedMs();

@@ -227,11 +227,11 @@ void renameTwins(RawBlock& block, ImportStatistics& statistics) {
     }
     if (!twins.empty())
         statistics.warnings.push_back(
-            twins.size() == 1
-                ? "Both points and cells have a field '" + twins[0] + "'; that of the cells is called '" +
-                      newNames[0] + "'."
-                : "Points and cells both have " + std::to_string(twins.size()) + " fields of one name: " +
-                      nameList(twins) + "; those of the cells are called " + nameList(newNames) + ".");
+            twins.size() == 1 ? "Both points and cells have a field '" + twins[0] +
+                                    "'; that of the cells is called '" + newNames[0] + "'."
+                              : "Points and cells both have " + std::to_string(twins.size()) +
+                                    " fields of one name: " + nameList(twins) +
+                                    "; those of the cells are called " + nameList(newNames) + ".");
     for (ArrayInfo& array : block.arrays)
         if (array.location == FieldLocation::cell && pointNames.contains(array.name))
             array.name = cellFieldName(array.name);

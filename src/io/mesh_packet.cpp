@@ -25,7 +25,8 @@ struct PacketStart {
 /// Calls visit(member) for every number of the statistics, always in one order.
 template <class Statistics, class Visit>
 void visitNumbers(Statistics& s, const Visit& visit) {
-    static_assert(sizeof(ImportStatistics) == sizeof(std::string) + (18 + kCellKinds) * 8 + sizeof(std::vector<std::string>),
+    static_assert(sizeof(ImportStatistics) ==
+                      sizeof(std::string) + (18 + kCellKinds) * 8 + sizeof(std::vector<std::string>),
                   "a new member of ImportStatistics needs its line below");
     for (auto& count : s.cellsOfKind) visit(count);
     visit(s.cells), visit(s.skippedCells), visit(s.blankedCells), visit(s.higherOrderCells);

@@ -132,10 +132,10 @@ void addVtkWarnings(const std::vector<std::string>& all, ImportStatistics& stati
 /// Nothing of what a file holds changes its name without a word.
 void warnOfRenamed(const RenamedFields& renamed, ImportStatistics& statistics) {
     if (renamed.names.empty()) return;
-    statistics.warnings.push_back(
-        (renamed.names.size() == 1 ? "More than one field is" : "Fields are") + std::string(" called ") +
-        nameList(renamed.names) + "; those behind the first are called " + nameList(renamed.newNames) +
-        " here.");
+    statistics.warnings.push_back((renamed.names.size() == 1 ? "More than one field is" : "Fields are") +
+                                  std::string(" called ") + nameList(renamed.names) +
+                                  "; those behind the first are called " + nameList(renamed.newNames) +
+                                  " here.");
 }
 
 void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObject* data) {

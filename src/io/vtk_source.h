@@ -17,7 +17,7 @@ struct VtkSource {
     vtkSmartPointer<vtkAlgorithm> reader;
     std::string format;
     std::string nodeIds{};  ///< the array with the file's number of every point, where blocks share points
-    std::vector<std::string> warnings{};  ///< what is odd about the file, a sentence each
+    std::vector<std::string> warnings{};       ///< what is odd about the file, a sentence each
     std::shared_ptr<RenamedFields> renamed{};  ///< after reading; null where names are taken as they are
 };
 

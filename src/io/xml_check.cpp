@@ -73,8 +73,8 @@ class XmlCheck {
         XmlPacking packing;
         std::optional<double> unpackedBound;  ///< the most bytes that the file can hold, unpacked
         DeclaredSize size;
-        std::size_t markupEnd = 0;  ///< where appended data begin, or the file's end
-        std::string section;        ///< "PointData", "Cells", ...
+        std::size_t markupEnd = 0;    ///< where appended data begin, or the file's end
+        std::string section;          ///< "PointData", "Cells", ...
         std::set<std::string> names;  ///< of the section's arrays so far
         double piecePoints = 0, pieceCells = 0;
         double wholePoints = -1;
