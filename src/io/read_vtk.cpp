@@ -8,6 +8,7 @@
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkXMLDataElement.h>
 #include <vtkXMLImageDataReader.h>
 #include <vtkXMLMultiBlockDataReader.h>
 #include <vtkXMLPImageDataReader.h>
@@ -18,9 +19,12 @@
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <new>
+#include <set>
+#include <string_view>
 
 #include "base/error.h"
 #include "io/name_list.h"
@@ -32,6 +36,61 @@
 namespace tessera {
 
 namespace {
+
+/// Visits the arrays of one <PointData> or <CellData>.
+void renameArrays(vtkXMLDataElement* attributes, RenamedFields& renamed) {
+    std::set<std::string> taken;
+    const int count = attributes->GetNumberOfNestedElements();
+    for (int i = 0; i < count; ++i)
+        if (const char* name = attributes->GetNestedElement(i)->GetAttribute("Name")) taken.insert(name);
+    std::set<std::string> seen;
+    for (int i = 0; i < count; ++i) {
+        vtkXMLDataElement* array = attributes->GetNestedElement(i);
+        const char* given = array->GetAttribute("Name");
+        if (!given || seen.insert(given).second) continue;
+        const std::string name = given;
+        std::string unique;
+        for (int number = 2; unique.empty() || !taken.insert(unique).second; ++number)
+            unique = name + "_" + std::to_string(number);
+        array->SetAttribute("Name", unique.c_str());
+        seen.insert(unique);
+        if (std::find(renamed.newNames.begin(), renamed.newNames.end(), unique) != renamed.newNames.end())
+            continue;  // in another piece, or of the points too
+        renamed.newNames.push_back(unique);
+        if (std::find(renamed.names.begin(), renamed.names.end(), name) == renamed.names.end())
+            renamed.names.push_back(name);
+    }
+}
+
+/// Gives every array of points, and of cells, a name of its own: the second T becomes T_2 in every piece.
+void makeNamesUnique(vtkXMLDataElement* element, RenamedFields& renamed) {
+    const std::string_view name = element->GetName() ? element->GetName() : "";
+    if (name == "PointData" || name == "CellData") return renameArrays(element, renamed);
+    for (int i = 0; i < element->GetNumberOfNestedElements(); ++i)
+        makeNamesUnique(element->GetNestedElement(i), renamed);
+}
+
+/// A reader of VTK's that meets unique names only. VTK keeps arrays by name but counts those in the file, so
+/// of two of one name it loses one, and gives others wrong values or crashes.
+template <class Reader>
+class UniqueNames : public Reader {
+  public:
+    static vtkSmartPointer<UniqueNames> create(std::shared_ptr<RenamedFields> renamed) {
+        auto reader = vtkSmartPointer<UniqueNames>::Take(new UniqueNames);
+        reader->InitializeObjectBase();
+        reader->renamed_ = std::move(renamed);
+        return reader;
+    }
+
+  protected:
+    int ReadVTKFile(vtkXMLDataElement* file) override {
+        makeNamesUnique(file, *renamed_);
+        return Reader::ReadVTKFile(file);
+    }
+
+  private:
+    std::shared_ptr<RenamedFields> renamed_;
+};
 
 struct XmlReaderKind {
     const char* type;         // attribute of <VTKFile>

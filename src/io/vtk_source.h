@@ -8,9 +8,14 @@
 #include <vector>
 
 #include "io/read_vtk.h"
-#include "io/unique_names.h"
 
 namespace tessera {
+
+/// What became of arrays whose name another one has already.
+struct RenamedFields {
+    std::vector<std::string> names;     ///< as the file has them, each once
+    std::vector<std::string> newNames;  ///< "T_2"
+};
 
 /// A reader ready to run, and what it reads.
 struct VtkSource {
