@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <new>
 #include <string_view>
 #include <system_error>
 
@@ -130,7 +131,11 @@ void ProgressLine::expectReading(double bytes) {
 
 void ProgressLine::drawAgain() {
     std::unique_lock lock(stopMutex_);
-    while (!stopped_.wait_for(lock, kRedraw, [this] { return stop_; })) draw();
+    try {
+        while (!stopped_.wait_for(lock, kRedraw, [this] { return stop_; })) draw();
+    } catch (const std::bad_alloc&) {
+        // Whoever works will notice too; a line is no reason to end the run.
+    }
 }
 
 void ProgressLine::draw() {
