@@ -4,15 +4,20 @@
 usage: app_test.py --tessera PROGRAM --data FOLDER [unittest arguments]
 """
 
+import fcntl
 import json
 import os
 import pathlib
+import pty
+import re
 import resource
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
+import termios
 import time
 import unittest
 
@@ -494,12 +499,78 @@ class Reports(AppTest):
         self.assertEqual(self.succeed("resample", self.cube, "-o", "out.vdb", "--quiet"), "")
 
     def test_an_unmet_bound_is_a_warning(self):
-        arguments = ("resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "error", "--max-error", "0.0001%", "--max-voxels", "200K")
+        arguments = ("resample", self.stokes, "-o", "out.vdb", "--refine", "error", "--max-error", "0.0001%", "--max-voxels", "200K")
         for extra in ([], ["--dry-run"]):
-            result = self.run_tessera(*arguments, *extra)
+            result = self.run_tessera(*arguments, "--quiet", *extra)
             self.assertEqual((result.returncode, result.stdout), (0, ""), result.stderr)
             self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
             self.assertRegex(result.stderr, r"^tessera: warning: .*not within the bound: .")
+            (self.folder / "out.vdb").unlink(missing_ok=True)
+            loud = self.run_tessera(*arguments, "--strict", *extra)
+            self.assertEqual(loud.returncode, 3)
+            self.assertEqual(loud.stderr, result.stderr)
+            self.assertNotIn("within the bound", loud.stdout)
+            self.assertEqual((self.folder / "out.vdb").exists(), not extra)
+        self.succeed("resample", self.cube, "-o", "out.vdb", "--refine", "error", "--max-error", "5%", "--strict")
+
+    def test_a_coarser_grid_is_a_warning(self):
+        for extra in ([], ["--dry-run"]):
+            result = self.run_tessera("resample", self.stokes, "-o", "out.vdb", "--layout", "flat", "--quiet", "--strict", *extra)
+            self.assertEqual((result.returncode, result.stdout), (3, ""), result.stderr)
+            self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+            self.assertRegex(result.stderr, r"^tessera: warning: .*stokes_p1.vtu: .*the flat grid has spacing")
+
+    def test_warnings_on_the_input_are_gathered_and_no_matter_for_quiet(self):
+        wide = "".join(f'<DataArray type="Float64" Name="w{i}" NumberOfComponents="10" format="ascii">{"0 " * 80}</DataArray>' for i in range(12))
+        self.write("wide.vtu", vtu_text(extra=wide))
+        text = self.succeed("resample", "wide.vtu", "-o", "out.vdb")
+        lines = [line for line in text.splitlines() if "warning" in line]
+        self.assertEqual(len(lines), 1, text)
+        self.assertRegex(lines[0], "12 fields are left out: .*: w0, w1, w10, .* and 4 more")
+        self.assertEqual(self.succeed("resample", "wide.vtu", "-o", "out.vdb", "--quiet"), "")
+        for step in range(3):
+            self.write(f"wide_{step}.vtu", vtu_text(extra=wide))
+        self.assertEqual(self.succeed("resample", "wide_?.vtu", "-o", "out_#.vdb").count("warning"), 1)
+        result = self.run_tessera("info", self.cube, "--repair", "--repair-aspect", "0.5", "--quiet")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+
+    def test_cell_types_and_what_became_of_them(self):
+        self.write("hex.vtu", vtu_text(cells=[(0, 1, 3, 2, 4, 5, 7, 6)], cell_type=12))
+        self.assertIn("1 hexahedra, split into 6 tetrahedra (linear between corners", self.succeed("info", "hex.vtu").replace("\n", " "))
+        types = self.report("info", "hex.vtu")["mesh"]["cell_types"]
+        self.assertEqual(types, {"tetrahedra": 0, "pyramids": 0, "wedges": 0, "hexahedra": 1, "voxels": 0, "polyhedra": 0})
+        text = self.succeed("info", DATA / "ccx-cavity/cavity.vtu")
+        self.assertIn("25,535 tetrahedra, of higher order and read by their corners", text)
+        self.assertNotIn("warning", text)
+        self.write("turned.vtu", vtu_text(cells=[(1, 0, 3, 7), *CUBE_TETS[1:]]))
+        self.assertIn("1 elements have the other orientation, which changes nothing", self.succeed("info", "turned.vtu"))
+
+    def test_fields_of_one_name_get_names_of_their_own(self):
+        array = '<DataArray type="Float64" Name="{}" format="ascii">{}</DataArray>'
+        extra = "".join(array.format(name, " ".join([value] * 8)) for name, value in (("f", "7"), ("g", "3"), ("f", "9")))
+        self.write("twice.vtu", vtu_text(extra=extra))
+        mesh = self.report("info", "twice.vtu")["mesh"]
+        self.assertEqual({f["name"]: f["ranges"] for f in mesh["fields"]}, {"f": [[0, 1]], "f_2": [[7, 7]], "g": [[3, 3]], "f_3": [[9, 9]]})
+        self.assertEqual(len(mesh["warnings"]), 1)
+        self.assertRegex(mesh["warnings"][0], "called f; those behind the first are called f_2, f_3")
+        self.assertEqual([f["name"] for f in self.report("resample", "twice.vtu", "-o", "out.vdb", "--field", "f_3")["mesh"]["fields"]], ["f_3"])
+        self.write("all.vtm", '<?xml version="1.0"?><VTKFile type="vtkMultiBlockDataSet" version="1.0"><vtkMultiBlockDataSet>'
+                   '<DataSet index="0" file="twice.vtu"/></vtkMultiBlockDataSet></VTKFile>')  # fmt: skip
+        self.reject(2, "twice.vtu second 'f'", "info", "all.vtm")
+
+    def test_peak_memory_counts_the_reader(self):
+        n = 40
+        head = f"# vtk DataFile Version 3.0\ngrid\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS {n} {n} {n}\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+        self.write("grid.vtk", (head + f"POINT_DATA {n**3}\nSCALARS f unsigned_char 1\nLOOKUP_TABLE default\n").encode() + bytes(n**3))
+        arguments = [TESSERA, "resample", "grid.vtk", "-o", "out.vdb", "--refine", "uniform", "--resolution", "5", "--json", "report.json", "--quiet"]
+        process = subprocess.Popen(arguments, cwd=self.folder)
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        self.assertEqual(process.returncode, 0)
+        peak = json.loads((self.folder / "report.json").read_text())["peak_memory_bytes"]
+        # The system tells the larger of the two processes; while one reads the other is there too.
+        self.assertGreater(peak, usage.ru_maxrss * 1024)
+        self.assertLess(peak, 3 * usage.ru_maxrss * 1024)
 
     def test_dry_run_writes_nothing(self):
         before = sorted(os.listdir(self.folder))
@@ -588,14 +659,20 @@ class Reports(AppTest):
         self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet")
         self.assertNotIn("bounds", self.report("info", "out.vdb"))
 
+    def coarser_report(self, *arguments):
+        result = self.run_tessera(*arguments, "--json", "-")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
+        return json.loads(result.stdout)
+
     def test_flat_grid_is_capped_and_says_so(self):
-        dry = self.report("resample", self.stokes, "--layout", "flat", "--dry-run")
+        dry = self.coarser_report("resample", self.stokes, "--layout", "flat", "--dry-run")
         flat = dry["estimate"]["flat"]
         self.assertGreater(flat["level"], 0)
         self.assertLessEqual(flat["voxels"], 2**26)
         levels = dry["estimate"]["levels"]
         self.assertAlmostEqual(flat["bytes"] / flat["voxels"], levels["bytes"] / levels["voxels"], places=3)
-        report = self.report("resample", self.stokes, "-o", "out.vdb", "--layout", "flat")
+        report = self.coarser_report("resample", self.stokes, "-o", "out.vdb", "--layout", "flat")
         self.assertEqual(report["write"]["flat_level"], flat["level"])
         notes = [note for note in report["write"]["notes"] if "the flat grid has spacing" in note]
         self.assertEqual(len(notes), 1)
@@ -1129,7 +1206,9 @@ class Reader(AppTest):
         self.succeed("info", "grid.vtk")
         line = self.resample_fails("--max-memory before", "grid.vtk", "--max-memory", "250M")
         enough = line.split("--max-memory ")[-1].split()[0]
-        self.succeed("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", enough, "--brick-size", "8")
+        result = self.run_tessera("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", enough, "--brick-size", "8")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("the finest spacing is", result.stderr)
         report = self.report("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", "600M")
         self.assertLess(report["peak_memory_bytes"], 600 << 20)
 
@@ -1197,6 +1276,97 @@ class Reader(AppTest):
             self.assertEqual(len(os.listdir(self.folder)), 2 - result.returncode)
             (self.folder / "out.vdb").unlink(missing_ok=True)
         self.assertTrue(seen)
+
+
+class Terminal(AppTest):
+    """What stands on a terminal."""
+
+    def on_a_terminal(self, *arguments, columns=80):
+        """Exit code, standard output, and what the terminal was sent on standard error."""
+        master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        environment = dict(os.environ, TERM="xterm")
+        process = subprocess.Popen([TESSERA, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE, stderr=slave, text=True, env=environment)
+        self.addCleanup(process.kill)
+        os.close(slave)
+        sent = b""
+        while True:
+            try:
+                piece = os.read(master, 1 << 16)
+            except OSError:  # the other end is closed
+                break
+            if not piece:
+                break
+            sent += piece
+        os.close(master)
+        output = process.communicate(timeout=300)[0]
+        return process.returncode, output, sent.decode()
+
+    def lines_drawn(self, sent, columns):
+        """The texts of the progress line, each sent as a whole; what is wiped leaves nothing."""
+        lines = [line for line in re.findall("\r([^\r\n\x1b]*)\x1b\\[K", sent) if line]
+        for line in lines:
+            self.assertLess(len(line), columns, line)
+        shares = [int(re.search(r"(\d+) %", line)[1]) for line in lines]
+        self.assertEqual(shares, sorted(shares), "progress went backwards")
+        return lines
+
+    def test_progress_is_one_line_that_never_goes_back(self):
+        options = ["--refine", "error", "--max-error", "0.02%", "--brick-size", "8", "--max-voxels", "4M", "--threads", "1"]
+        for columns in (80, 50):
+            code, output, sent = self.on_a_terminal("resample", self.stokes, "-o", "out.vdb", *options, columns=columns)
+            self.assertEqual(code, 0, sent)
+            lines = self.lines_drawn(sent, columns)
+            self.assertGreater(len(lines), 3)
+            self.assertTrue(any(line.startswith("sampling") for line in lines), lines)
+            # Whatever is printed stands on a line of its own.
+            rest = re.sub("\r[^\r\n\x1b]*\x1b\\[K", "", sent)
+            for line in rest.splitlines():
+                self.assertRegex(line, "^(tessera: warning:.*|    .*)?$")
+            self.assertTrue(sent.endswith("\x1b[K") or sent.endswith("\n"), repr(sent[-80:]))
+
+    def test_a_series_says_which_step(self):
+        for step in range(3):
+            shutil.copy(self.stokes, self.folder / f"run_{step}.vtu")
+        code, output, sent = self.on_a_terminal("resample", "run_*.vtu", "-o", "out_#.vdb", "--refine", "uniform", "--resolution", "150", "--threads", "1")
+        self.assertEqual(code, 0, sent)
+        lines = self.lines_drawn(sent, 80)
+        steps = [int(m[1]) for line in lines if (m := re.match(r"step (\d) of 3: ", line))]
+        self.assertEqual(steps, sorted(steps))
+        self.assertEqual(len(set(steps)), 3)
+
+    def test_quiet_or_no_terminal_draws_nothing(self):
+        code, output, sent = self.on_a_terminal("resample", self.stokes, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "150")
+        self.assertEqual((code, output, sent), (0, "", ""))
+        self.succeed("resample", self.stokes, "-o", "out.vdb")
+
+    def test_interruption_leaves_no_line_behind(self):
+        code, output, sent = self.on_a_terminal("resample", "nothing.vtu", "-o", "out.vdb")
+        self.assertEqual((code, sent.count("\n")), (2, 1))
+
+    def test_tables_fit_eighty_columns(self):
+        names = ["p", "velocity_magnitude_of_the_second_phase_averaged_over_time", "T", "k" * 90, "omega", "nut"]
+        extra = "".join(f'<DataArray type="Float64" Name="S{i}" NumberOfComponents="9" format="ascii">'
+                        f'{" ".join(str(0.123456789 * j - 1e-5) for j in range(72))}</DataArray>' for i in range(2))  # fmt: skip
+        points = [(1234.56789 + x / 3, -98765.4321 + y / 3, 0.000123456 + z / 3) for x, y, z in CUBE_POINTS]
+        self.write("wide.vtu", vtu_text(points, fields={name: [1e-9 / 3 * (i + 1) * p[0] for p in points] for i, name in enumerate(names)}, extra=extra))
+        texts = [self.succeed("info", "wide.vtu"), self.succeed("resample", "wide.vtu", "-o", "out.vdb"), self.succeed("info", "out.vdb"),
+                 self.succeed("verify", "wide.vtu", "out.vdb"), self.succeed("resample", "wide.vtu", "--dry-run"),
+                 self.succeed("compare", "wide.vtu", "--algorithms", "software,software", "--resolution", "20", "--runs", "1"),
+                 self.succeed("paper-tables", "wide.vtu", "--field", "p", "--max-size", "128", "--runs", "1")]  # fmt: skip
+        for text in texts:
+            for line in text.splitlines():
+                # Sentences are the terminal's to break; rows of tables have gaps between columns.
+                if re.search(r"\S  +\S", line):
+                    self.assertLessEqual(len(line), 80, text)
+        self.assertRegex(texts[1], r"velocity_magnitude.*\.\.\..*averaged_over_time")
+        self.assertRegex(texts[1], r" kkk+\.\.\.kkk+ ")
+
+    def test_help_fits_the_terminal(self):
+        for command in ([], ["resample"], ["compare"]):
+            for line in self.succeed(*command, "--help").splitlines():
+                if not line.startswith("  tessera "):
+                    self.assertLessEqual(len(line), 80, line)
 
 
 class Help(AppTest):

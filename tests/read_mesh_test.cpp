@@ -64,8 +64,9 @@ TEST(BundledData, StokesSphere) {
 TEST(BundledData, CavityOfQuadraticTets) {
     const MeshFile file = read(TESSERA_DATA_DIR "/ccx-cavity/cavity.vtu");
     EXPECT_EQ(file.statistics.higherOrderCells, 25535);
-    EXPECT_EQ(file.statistics.warnings.size(), 1u);
-    EXPECT_LT(file.statistics.nodes, 35069);  // nodes in the middle of edges are gone
+    EXPECT_EQ(file.statistics.cellsOfKind[std::size_t(CellKind::tet)], 25535);
+    EXPECT_TRUE(file.statistics.warnings.empty());  // the count says it
+    EXPECT_LT(file.statistics.nodes, 35069);        // nodes in the middle of edges are gone
     EXPECT_EQ(field(file, "S").components, 6);
     EXPECT_NEAR(sumOfVolumes(file.mesh), 999999.999, 1e-3);
     EXPECT_NEAR(file.statistics.smallestVolumeWorld, 4.5878e-08, 1e-12);
@@ -379,7 +380,9 @@ TEST(ReadMultiBlock, MergesBlocksAndFillsAbsentFields) {
     EXPECT_EQ(file.statistics.blocks, 2);
     EXPECT_EQ(file.mesh.elementCount(), 4);
     EXPECT_EQ(file.mesh.nodeCount(), 10);
-    EXPECT_EQ(file.statistics.warnings.size(), 3u);
+    ASSERT_EQ(file.statistics.warnings.size(), 1u);
+    EXPECT_NE(file.statistics.warnings[0].find("3 fields are absent in some blocks"), std::string::npos);
+    EXPECT_NE(file.statistics.warnings[0].find("f, g, c"), std::string::npos);
     EXPECT_EQ(field(file, "f").at(4, 0), 5);
     EXPECT_TRUE(std::isnan(field(file, "f").at(5, 0)));
     EXPECT_TRUE(std::isnan(field(file, "g").at(4, 1)));
@@ -466,7 +469,7 @@ TEST(ReadTetgen, ReadsTheCornersOfTenNodeElements) {
     const MeshFile file = read(folder.file("q.ele"));
     EXPECT_EQ(file.statistics.higherOrderCells, 1);
     EXPECT_EQ(file.mesh.nodeCount(), 4);
-    EXPECT_EQ(file.statistics.warnings.size(), 1u);
+    EXPECT_TRUE(file.statistics.warnings.empty());
 }
 
 TEST(ReadEnSight, ReadsAsciiGold) {

@@ -283,7 +283,7 @@ TEST_P(SlabRuns, cancelledRunsLeaveTheDeviceUsable) {
 class CancellingProgress : public ProgressSink {
   public:
     CancellingProgress(std::atomic<bool>& cancel, int after) : cancel_(cancel), after_(after) {}
-    void update(std::string_view, std::int64_t, std::int64_t) override {
+    void update(Stage, std::int64_t, std::int64_t) override {
         if (--after_ == 0) cancel_ = true;
     }
 

@@ -17,18 +17,15 @@ namespace {
 
 constexpr int kExitDisagree = 1;
 constexpr const char* kLegend =
-    "holes: well inside an element, not covered. spills: covered, further from the mesh than the algorithm's "
-    "bound. wrong values: explained by no\n"
-    "element there within clause 4 of the contract; 'of allowed' is the largest share of it that a right "
-    "value "
-    "used. undecided: right as far as double\n"
-    "can tell. at the boundary: within 2^-8 voxel of it.\n"
-    "Thick elements: from 1/16 voxel on. In thinner ones a place off by 2^-8 voxel is worth much of the "
-    "element's "
-    "values, so pointwise differences\n"
-    "there can be large, however exact the sampling is. Cell fields jump: on a shared face either element's "
-    "value "
-    "is right.\n";
+    "holes: well inside an element, not covered. spills: covered, further from the\n"
+    "mesh than the algorithm's bound. wrong values: explained by no element there\n"
+    "within clause 4 of the contract; 'of allowed' is the largest share of it that a\n"
+    "right value used. undecided: right as far as double can tell. at the boundary:\n"
+    "within 2^-8 voxel of it.\n"
+    "Thick elements: from 1/16 voxel on. In thinner ones a place off by 2^-8 voxel is\n"
+    "worth much of the element's values, so pointwise differences there can be large,\n"
+    "however exact the sampling is. Cell fields jump: on a shared face either\n"
+    "element's value is right.\n";
 
 class CompareRun {
   public:
@@ -44,7 +41,15 @@ class CompareRun {
     int run() {
         Json meshes = Json::array();
         if (arguments_.markdown) session_.print(markdownHead());
-        for (const std::string& path : arguments_.meshes) meshes.push_back(compareOn(path));
+        session_.progress.declare({{Stage::reading, 1},
+                                   {Stage::repairing, repair_ ? 1.0 : 0.0},
+                                   {Stage::sampling, 1},
+                                   {Stage::comparing, 2}});
+        const std::size_t count = arguments_.meshes.size();
+        for (std::size_t m = 0; m < count; ++m) {
+            if (count > 1) session_.progress.beginStep("mesh", m + 1, count, 1, double(count - 1 - m));
+            meshes.push_back(compareOn(arguments_.meshes[m]));
+        }
         if (!arguments_.markdown) printEnd();
         Json json{{"schema", 1},
                   {"program", "tessera"},
@@ -55,7 +60,7 @@ class CompareRun {
                   {"absent", list_.absent},
                   {"meshes", std::move(meshes)}};
         if (!arguments_.common.jsonPath.empty()) writeJson(arguments_.common.jsonPath, json);
-        for (const std::string& problem : problems_) session_.warn(problem);
+        for (const std::string& problem : problems_) session_.warnFellShort(problem);
         return problems_.empty() ? 0 : kExitDisagree;
     }
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <bit>
 #include <filesystem>
 
 #include "base/error.h"
@@ -38,6 +39,33 @@ Json gridsJson(const VdbFile& file) {
     return grids;
 }
 
+std::int64_t extendedPoints(const BrickStore& store) {
+    std::int64_t count = 0;
+    for (const auto& [key, tile] : store.extension())
+        for (const std::uint64_t word : tile.coverage) count += std::popcount(word);
+    return count;
+}
+
+/// Bricks of each level and the voxels in them, or a flat grid and what it was made of.
+std::string voxelsText(const VdbFile& file) {
+    const std::int64_t extended = extendedPoints(file.store);
+    if (!file.bricks) {
+        std::string text = levelsText(summarizeLevels(file.tree, file.store));
+        if (extended > 0) text += fmt::format("  {} voxels outside the mesh\n", formatCount(extended));
+        return text;
+    }
+    std::string text =
+        fmt::format("  one grid of spacing {:.9g}: {} voxels in the mesh, {} outside\n  from bricks",
+                    file.tree.spacingWorld(), formatCount(file.store.coveredPoints()), formatCount(extended));
+    const char* separator = " ";
+    for (const LevelSummary& level : summarizeLevels(*file.bricks, {})) {
+        text +=
+            fmt::format("{}of spacing {:.6g}: {}", separator, level.spacingWorld, formatCount(level.bricks));
+        separator = ", ";
+    }
+    return text + "\n";
+}
+
 /// Prints what the file holds, and gives the same as a document when one is wanted.
 Json showVdb(const InfoArguments& arguments, Session& session) {
     const std::string& path = arguments.paths[0];
@@ -47,7 +75,6 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
     for (std::size_t g = 0; g < file.gridNames.size(); ++g)
         rows.push_back(
             {file.gridNames[g], g < file.gridVoxels.size() ? formatCount(file.gridVoxels[g]) : ""});
-    const std::vector<LevelSummary> levels = summarizeLevels(file.tree, file.store);
     const Vec3d& origin = file.tree.originWorld();
     std::string text = fmt::format(
         "{}: OpenVDB file by Tessera {}, layout {}\n  from {}, algorithm {}, criterion {}\n"
@@ -68,7 +95,10 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
         text += fmt::format("  bounds ({:.9g}, {:.9g}, {:.9g}) to ({:.9g}, {:.9g}, {:.9g})\n", b.min.x,
                             b.min.y, b.min.z, b.max.x, b.max.y, b.max.z);
     }
-    session.print(text + formatTable(rows) + levelsText(levels) + errorText(file.report));
+    text += formatTable(rows) + voxelsText(file) + errorText(file.report);
+    if (file.samplesReport)
+        text += "  the samples before they became the file's voxels:\n" + errorText(*file.samplesReport);
+    session.print(text);
     if (arguments.common.jsonPath.empty()) return {};
     Json json = documentHead(arguments.paths);
     json["source"] = file.sourceFile;
@@ -84,9 +114,18 @@ Json showVdb(const InfoArguments& arguments, Session& session) {
     if (const auto& b = file.boundsWorld)
         json["bounds"] = {{b->min.x, b->min.y, b->min.z}, {b->max.x, b->max.y, b->max.z}};
     json["grids"] = gridsJson(file);
-    json.update(levelsJson(file.tree, levels));
+    if (file.bricks) {
+        json.update(levelsJson(*file.bricks, summarizeLevels(*file.bricks, {})));
+        json["voxels"] = {{"total", file.store.coveredPoints() + extendedPoints(file.store)},
+                          {"covered_total", file.store.coveredPoints()}};
+        json["grid"] = {{"level", file.flatLevel}, {"spacing", file.tree.spacingWorld()}};
+    } else {
+        json.update(levelsJson(file.tree, summarizeLevels(file.tree, file.store)));
+    }
+    json["extended_voxels"] = extendedPoints(file.store);
     json["coverage"] = coverageJson(file.report);
     json["error"] = errorJson(file.report);
+    if (file.samplesReport) json["samples_error"] = errorJson(*file.samplesReport);
     return json;
 }
 
@@ -127,7 +166,7 @@ Json showSeries(const InfoArguments& arguments, const std::vector<SeriesStep>& s
     Json documents = Json::array();
     for (std::size_t i = 0; i < steps.size(); ++i) {
         const SeriesStep& step = steps[i];
-        session.execution.report("series", std::int64_t(i), std::int64_t(steps.size()));
+        session.progress.beginStep("step", i + 1, steps.size(), 1, double(steps.size() - 1 - i));
         Timer timer;
         const MeshFile file = session.readMesh(step.files[0], readOptions(step, {}, arguments.timeStep));
         times.readMs += timer.elapsedMs();
@@ -176,6 +215,7 @@ int runInfo(const InfoArguments& arguments) {
     if (arguments.paths.empty() && !arguments.gl) throw InputError("info needs a file, or --gl");
     checkOutputPaths(arguments.paths, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
+    session.progress.declare({{Stage::reading, 1}, {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0}});
     Json json = arguments.paths.empty() ? documentHead({}) : showFiles(arguments, session);
     if (arguments.gl) {
         session.print(glText());

@@ -10,10 +10,13 @@
 #include "base/error.h"
 #include "program_presets.h"
 #include "resample/cut_plane.h"
+#include "terminal.h"
 
 namespace tessera {
 
 namespace {
+
+constexpr std::size_t kHelpColumn = 34;  // where descriptions begin
 
 /// Numbers from `first` to `last`; says so in plain figures.
 CLI::Validator numbersWithin(double first, double last) {
@@ -98,7 +101,8 @@ void addCommonOptions(CLI::App& command, CommonOptions& options) {
         .add_option("--threads", options.threads,
                     "worker threads (default: one for every processor); the result never depends on it")
         ->check(CLI::Range(0, 1024));
-    command.add_flag("-q,--quiet", options.quiet, "print nothing but errors");
+    command.add_flag("-q,--quiet", options.quiet,
+                     "print nothing but errors, and a warning where a result isn't what was asked for");
     command.add_option("--json", options.jsonPath,
                        "write a report as JSON to this file, or to standard output for -");
     addReaderOptions(command, options.reader);
@@ -260,6 +264,10 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     addAlgorithmOptions(command, a.algorithm);
     addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
+    command.add_flag(
+        "--strict", a.common.strict,
+        "exit code 3 when a result isn't what was asked for (the error bound missed, a grid coarser "
+        "than asked for); everything is written all the same");
     command.footer(R"(Examples:
   tessera resample flow.vtu -o flow.vdb
   tessera resample flow.vtu -o flow.vdb --refine error --max-error 1% --error-field pressure --brick-size 8
@@ -454,11 +462,13 @@ void describe(CLI::App& app, CommandLine& arguments) {
     app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
     app.set_help_flag("-h,--help", "print this help and exit");
     app.require_subcommand(1);
-    app.get_formatter()->column_width(34);
+    app.get_formatter()->column_width(kHelpColumn);
     app.footer(
         "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
         "codes: 0 done, "
-        "2 bad input or usage, 1 any other failure, 130 interrupted.");
+        "2 bad input or usage, 3 a result that isn't what was asked for (with --strict), 1 any other "
+        "failure, "
+        "130 interrupted.");
     addResampleOptions(
         *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
         arguments.resample);
@@ -481,6 +491,20 @@ void describe(CLI::App& app, CommandLine& arguments) {
                     arguments.slice);
 }
 
+/// Lines that a terminal would break anywhere, broken between words. Descriptions stay in their column.
+std::string wrapHelp(const std::string& text) {
+    std::istringstream lines(text);
+    std::string wrapped;
+    const auto width = std::size_t(outputWidth());
+    for (std::string line; std::getline(lines, line);) {
+        const bool isOption = line.size() > kHelpColumn && line.starts_with(' ') &&
+                              line[kHelpColumn - 1] == ' ' && line[kHelpColumn] != ' ';
+        const std::size_t indent = std::min(line.find_first_not_of(' '), line.size());
+        wrapped += wrapLine(line, width, isOption ? kHelpColumn : indent) + "\n";
+    }
+    return wrapped;
+}
+
 }  // namespace
 
 CommandLine parseCommandLine(int argc, char** argv) {
@@ -498,7 +522,7 @@ CommandLine parseCommandLine(int argc, char** argv) {
             throw InputError(fmt::format("{} (tessera --help tells more)", error.what()));
         std::ostringstream text;
         app.exit(error, text);
-        line.text = text.str();
+        line.text = wrapHelp(text.str());
     }
     return line;
 }

@@ -31,24 +31,23 @@ constexpr int kPartEdge = 256;
 constexpr std::int64_t kDeviceGridPoints = std::int64_t(1) << 26;
 
 constexpr const char* kLegend =
-    "Published: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive "
-    "Visualization of "
-    "Unstructured Grids, IEEE\nVisualization 2001, figures 9 to 11 (Athlon 900 MHz, GeForce2 GTS; reading "
-    "slices "
-    "back not included). Their bluntfin had 220K tetrahedra. Not\nprinted: figure 8, whose heat-sink is not "
-    "public. WestSingle and WestM/C are their versions of an earlier method, not part of Tessera.\n"
-    "Here: seconds, wall clock, median of the runs. Ael: active list and generation of polygons or "
-    "instances. "
-    "Rnd: upload and rendering. Back:\nreading back. ToT: everything, reading back included; stages may "
-    "overlap, so "
-    "it can be less than their sum. #Poly: polygons before they are\ngrown; the paper slices along z, "
-    "Tessera along "
-    "the axis with the fewest element-slice pairs. Speed-up: over software, here and as published.\n";
+    "Published: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the\n"
+    "Interactive Visualization of Unstructured Grids, IEEE Visualization 2001, figures\n"
+    "9 to 11 (Athlon 900 MHz, GeForce2 GTS; reading slices back not included). Their\n"
+    "bluntfin had 220K tetrahedra. Not printed: figure 8, whose heat-sink is not\n"
+    "public. WestSingle and WestM/C are their versions of an earlier method, not part\n"
+    "of Tessera.\n"
+    "Here: seconds, wall clock, median of the runs. Ael: active list and generation of\n"
+    "polygons or instances. Rnd: upload and rendering. Back: reading back. ToT:\n"
+    "everything, reading back included; stages may overlap, so it can be less than\n"
+    "their sum. #Poly: polygons before they are grown; the paper slices along z,\n"
+    "Tessera along the axis with the fewest element-slice pairs. Speed-up: over\n"
+    "software, here and as published.\n";
 
 /// Where an algorithm has no figures.
 constexpr const char* kNone = "-";
 
-using Rows = std::vector<std::vector<std::string>>;
+using Rows = TableRows;
 
 struct Measured {
     std::string target;
@@ -57,6 +56,12 @@ struct Measured {
     double rndMs() const { return times.statistics.uploadMs + times.statistics.renderMs; }
     /// A resampler without a device has no stages but the list and the rest.
     bool isStaged() const { return times.statistics.elementSlicePairs > 0; }
+};
+
+/// Those of one data set.
+struct Tables {
+    Rows here{{"seconds, here", "Ael", "Rnd", "Back", "ToT", "#Poly", "a pair", "speed-up"}};
+    Rows published{{"seconds, published", "Ael", "Rnd", "ToT", "#Poly", "speed-up"}};
 };
 
 std::string seconds(double ms) {
@@ -144,18 +149,17 @@ class PaperTables {
         const std::vector<int> fields{field_};
         for (const Contestant& c : algorithms_) bound.push_back(c.resampler->bind(mesh, fields, c.options));
         Json grids = Json::array();
-        Rows table{{"seconds", "Ael", "Rnd", "Back", "ToT", "#Poly", "a pair", "speed-up", "published", "Ael",
-                    "Rnd", "ToT", "#Poly", "speed-up"}};
+        Tables tables;
         for (const PaperGrid& grid : set.grids) {
             if (std::max({grid.points.x, grid.points.y, grid.points.z}) > arguments_.maxSize) continue;
-            grids.push_back(runGrid(grid, mesh, bound, table));
+            grids.push_back(runGrid(grid, mesh, bound, tables));
         }
-        session_.print(formatTable(table));
+        session_.print(formatTable(tables.here) + formatTable(tables.published));
         return {{"name", name}, {"elements", mesh.elementCount()}, {"grids", std::move(grids)}};
     }
 
     Json runGrid(const PaperGrid& grid, const TetMesh& mesh,
-                 const std::vector<std::unique_ptr<BoundResampler>>& bound, Rows& table) {
+                 const std::vector<std::unique_ptr<BoundResampler>>& bound, Tables& tables) {
         const SamplingGrid sampling = spanningGrid(mesh.boundsWorld(), grid.points);
         const bool whole = sampling.points.count() <= kWholeGridPoints;
         const std::vector<IndexBox> boxes =
@@ -164,20 +168,21 @@ class PaperTables {
         for (std::size_t a = 0; a < bound.size(); ++a) {
             const Contestant& c = algorithms_[a];
             if (!isMeasured(c.label, grid)) continue;
-            measured[c.label] = {
-                std::string(bound[a]->target()),
-                timeRuns(*bound[a], sampling.lattice, boxes, arguments_.runs, session_.execution)};
+            measured[c.label] = {std::string(bound[a]->target()),
+                                 timeRuns(*bound[a], sampling.lattice, boxes, arguments_.runs,
+                                          session_.execution.withoutProgress())};
         }
-        addRows(grid, measured, table);
+        addRows(grid, measured, tables);
         return gridJson(grid, measured);
     }
 
-    void addRows(const PaperGrid& grid, const std::map<std::string, Measured>& measured, Rows& table) const {
-        table.push_back({formatGrid(grid.points)});
+    void addRows(const PaperGrid& grid, const std::map<std::string, Measured>& measured,
+                 Tables& tables) const {
+        tables.here.push_back({formatGrid(grid.points)});
+        tables.published.push_back({formatGrid(grid.points)});
         for (const PaperRow& row : paperRows(grid)) {
-            std::vector<std::string> cells = ourCells(std::string(row.algorithm), measured);
-            for (std::string& cell : paperCells(row, grid)) cells.push_back(std::move(cell));
-            table.push_back(std::move(cells));
+            if (!row.algorithm.empty()) tables.here.push_back(ourCells(std::string(row.algorithm), measured));
+            if (!row.paperName.empty()) tables.published.push_back(paperCells(row, grid));
         }
     }
 
@@ -203,14 +208,7 @@ class PaperTables {
                                       const std::map<std::string, Measured>& measured) const {
         const auto found = measured.find(algorithm);
         if (found == measured.end())
-            return {algorithm.empty() ? "  -" : "  " + algorithm,
-                    kNone,
-                    kNone,
-                    kNone,
-                    kNone,
-                    kNone,
-                    kNone,
-                    kNone};
+            return {"  " + algorithm, kNone, kNone, kNone, kNone, kNone, kNone, kNone};
         const Measured& m = found->second;
         const ResampleStatistics& s = m.times.statistics;
         const auto software = measured.find("software");
@@ -231,12 +229,11 @@ class PaperTables {
     }
 
     static std::vector<std::string> paperCells(const PaperRow& row, const PaperGrid& grid) {
-        if (row.paperName.empty()) return {kNone, kNone, kNone, kNone, kNone, kNone};
         std::string speedUp = kNone;
         for (const PaperRow& other : grid.rows)
             if (other.algorithm == "software" && row.algorithm != "software")
                 speedUp = ratio(other.totSeconds, row.totSeconds);
-        return {std::string(row.paperName),
+        return {"  " + std::string(row.paperName),
                 published(row.aelSeconds),
                 published(row.rndSeconds),
                 published(row.totSeconds),

@@ -84,6 +84,8 @@ class ResampleRun {
     Json dryRun(const Step& step, const MeshFile& file, const FieldSelection& selection,
                 const RefineOptions& options, StageTimes& times);
     void warnUnbounded(const Step& step, const BrickResult& result);
+    void declareStages();
+    std::string flatNote(const BrickTree& tree, int channels) const;
     Json sampleAndWrite(const Step& step, const MeshFile& file, const FieldSelection& selection,
                         const RefineOptions& options, StageTimes& times);
     VdbWriteResult write(const Step& step, const MeshFile& file, const FieldSelection& selection,
@@ -114,24 +116,46 @@ int ResampleRun::run() {
         if (settings_.refine.resolution > 0 || settings_.refine.spacingWorld > 0)
             throw InputError("--like sets the spacing: --resolution and --spacing can't be given with it");
     }
+    declareStages();
     if (steps.size() > 1) surveySeries(steps);
     Json reports = Json::array();
-    for (const Step& step : steps) reports.push_back(runStep(step));
-    if (arguments_.common.jsonPath.empty()) return 0;
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        if (steps.size() > 1)
+            session_.progress.beginStep("step", i + 1, steps.size(), 1, double(steps.size() - 1 - i));
+        reports.push_back(runStep(steps[i]));
+    }
+    if (arguments_.common.jsonPath.empty()) return session_.exitCode();
     if (steps.size() == 1) {
         writeJson(arguments_.common.jsonPath, reports[0]);
-        return 0;
+        return session_.exitCode();
     }
     Json document{{"schema", 1},
                   {"program", "tessera"},
                   {"version", TESSERA_VERSION},
                   {"command", "resample"},
                   {"stages", stagesJson(allTimes_)},
-                  {"peak_memory_bytes", peakMemoryBytes()},
+                  {"peak_memory_bytes", session_.peakMemoryBytes()},
                   {"series", series_}};
     document["steps"] = std::move(reports);
     writeJson(arguments_.common.jsonPath, document);
-    return 0;
+    return session_.exitCode();
+}
+
+/// Weights are rough shares of a usual run's time.
+void ResampleRun::declareStages() {
+    std::vector<ExpectedStage> stages{{Stage::reading, 0.4}};
+    if (repair_) stages.push_back({Stage::repairing, 0.4});
+    stages.push_back({Stage::planning, 0.1});
+    stages.push_back({Stage::sampling, 1});
+    if (settings_.refine.criterion == Criterion::error) stages.push_back({Stage::checking, 0.5});
+    if (settings_.refine.criterion == Criterion::error || !arguments_.dryRun)
+        stages.push_back({Stage::measuring, 0.4});
+    if (!arguments_.dryRun) {
+        if (settings_.write.layout == VdbLayout::flat || arguments_.extendLayers.value_or(0) > 0)
+            stages.push_back({Stage::extending, 0.3});
+        stages.push_back({Stage::writing, 0.7});
+    }
+    session_.progress.declare(std::move(stages));
 }
 
 ImportedMesh ResampleRun::read(const Step& step) {
@@ -171,7 +195,10 @@ void ResampleRun::surveySeries(const std::vector<Step>& steps) {
     const bool frameGiven = settings_.refine.frame.has_value();
     SeriesSummary summary;
     for (std::size_t i = 0; i < steps.size(); ++i) {
-        session_.execution.report("series", std::int64_t(i), std::int64_t(steps.size()));
+        // A look is a reading and a plan; by the error it is all but the writing.
+        const double look = settings_.refine.criterion == Criterion::error ? 0.75 : 0.25;
+        session_.progress.beginStep("looking at step", i + 1, steps.size(), look,
+                                    double(steps.size()) + look * double(steps.size() - 1 - i));
         const TetMesh mesh = read(steps[i]).mesh;
         summary.add(steps[i].source, mesh);
         if (!frameGiven) surveySpacing(mesh);
@@ -208,7 +235,9 @@ Json ResampleRun::runStep(const Step& step) {
     const std::string names = nameFields(selection.outputs, settings_.fields, arguments_.program);
     checkOutputFields(selection.outputs);
     const RefineOptions options = stepOptions(file.mesh, selection);
-    session_.print(importText(step.input, file.statistics, file.mesh.boundsWorld()) +
+    ImportStatistics shown = file.statistics;
+    shown.warnings = session_.unsaid(shown.warnings);
+    session_.print(importText(step.input, shown, file.mesh.boundsWorld()) +
                    (step.source.time ? fmt::format("  time {}\n", *step.source.time) : std::string()) +
                    names);
     showRepair(step.input, file, repair_, session_);
@@ -233,7 +262,7 @@ Json ResampleRun::runStep(const Step& step) {
     report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
     if (file.repair) report["repair"] = repairJson(file, repair_);
     report.update(rest);
-    report["peak_memory_bytes"] = peakMemoryBytes();
+    report["peak_memory_bytes"] = session_.peakMemoryBytes();
     allTimes_ += times;
     return report;
 }
@@ -241,8 +270,14 @@ Json ResampleRun::runStep(const Step& step) {
 /// A script that looks at the exit code alone would take the file for one within the bound.
 void ResampleRun::warnUnbounded(const Step& step, const BrickResult& result) {
     if (!result.bounded)
-        session_.warn(
+        session_.warnFellShort(
             fmt::format("{}: the error is not within the bound: {}", step.input, result.stoppedBecause));
+}
+
+/// Empty when a flat file has the finest spacing of the tree, or none is asked for.
+std::string ResampleRun::flatNote(const BrickTree& tree, int channels) const {
+    if (settings_.write.layout != VdbLayout::flat) return {};
+    return planFlatGrid(tree, channels, outputShape()).note;
 }
 
 Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSelection& selection,
@@ -261,15 +296,21 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
         tree = planBricks(file.mesh, options, session_.execution, selection.channels, &notes);
     }
     times.planMs = timer.elapsedMs();
+    for (const std::string& note : notes) session_.warnFellShort(step.input + ": " + note);
+    if (const std::string note = flatNote(tree, selection.channels); !note.empty())
+        session_.warnFellShort(step.input + ": " + note);
+    const std::size_t saidNotes = notes.size();
     PlanEstimate estimate = estimatePlan(tree, selection.channels);
     const FlatGridPlan flat = planFlatGrid(tree, selection.channels, outputShape());
     estimate.flatPoints = flat.points;
     estimate.flatBytes = flat.bytes;
     if (!flat.note.empty()) notes.push_back(flat.note);
+    session_.execution.report(Stage::sampling, 0, 1);
     const CostPrediction cost = predictCost(file.mesh, selection.fields, tree, estimate, selection.channels,
                                             resampler_, options.bind, session_.execution);
     std::string text = estimateText(estimate, cost.levelsMs, cost.flatMs);
-    for (const std::string& note : notes) text += "  " + note + "\n";
+    if (notes.size() > saidNotes && settings_.write.layout != VdbLayout::flat)
+        text += "  " + notes.back() + "\n";
     session_.print(text + "  nothing was written\n");
     Json json = levelsJson(tree, summarizeLevels(tree, {}));
     json["notes"] = notes;
@@ -281,14 +322,10 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
 VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const FieldSelection& selection,
                                   BrickResult& result, StageTimes& times) {
     Timer timer;
-    const OutputShape shape = outputShape();
-    if (shape.layout == VdbLayout::flat) {
-        const FlatGridPlan plan = planFlatGrid(result.tree, selection.channels, shape);
-        if (plan.isCapped) session_.warn(fmt::format("{}: {}", step.output, plan.note));
-    }
-    shapeForFile(file.mesh, selection.fields, selection.outputs, resampler_, settings_.refine.bind, shape,
-                 result, session_.execution);
+    shapeForFile(file.mesh, selection.fields, selection.outputs, resampler_, settings_.refine.bind,
+                 outputShape(), result, session_.execution);
     times.extendMs = timer.restart();
+    session_.execution.report(Stage::writing, 0, 1);
     VdbWriteOptions options = writeOptions();
     const SeriesStep& source = step.source;
     options.sourceFile = std::filesystem::path(source.files.size() > 1 ? source.collection : source.files[0])
@@ -328,12 +365,15 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
             selection.outputs[f].name;  // grid names are unique, names in the mesh need not be
     const std::vector<LevelSummary> levels = summarizeLevels(result.tree, result.store);
     const std::int64_t sampleBytes = result.store.memoryBytes();
+    const std::string flat = flatNote(result.tree, selection.channels);
     const VdbWriteResult written = write(step, file, selection, result, times);
     if (options.criterion == Criterion::error) judgeFile(file.mesh, selection, options, result);
     printResult(step, result, levels, written, times);
     if (options.criterion == Criterion::error) warnUnbounded(step, result);
+    for (const std::string& note : result.notes) session_.warnFellShort(step.input + ": " + note);
+    if (!flat.empty()) session_.warnFellShort(step.input + ": " + flat);
 
-    Json json = levelsJson(result.tree, levels);
+    Json json = levelsJson(result.bricks ? *result.bricks : result.tree, levels);
     json["coverage"] = coverageJson(result.report);
     json["error"] = errorJson(result.report);
     if (result.samplesReport) json["samples_error"] = errorJson(*result.samplesReport);
@@ -358,16 +398,13 @@ void ResampleRun::printResult(const Step& step, const BrickResult& result,
     std::string text = levelsText(levels) + errorText(result.report);
     if (result.samplesReport)
         text += "  the samples before they became the file's voxels:\n" + errorText(*result.samplesReport);
-    if (settings_.refine.criterion == Criterion::error)
-        text += result.bounded
-                    ? "  the error is within the bound\n"
-                    : fmt::format("  the error is NOT within the bound: {}\n", result.stoppedBecause);
-    for (const std::string& note : result.notes) text += "  " + note + "\n";
+    if (settings_.refine.criterion == Criterion::error && result.bounded)
+        text += "  the error is within the bound\n";
     for (const std::string& note : written.notes) text += "  " + note + "\n";
     text += stagesText(times);
     text +=
         fmt::format("{}: {}, {} active voxels; peak memory {}\n", step.output, formatBytes(written.fileBytes),
-                    formatCount(written.activeVoxels), formatBytes(peakMemoryBytes()));
+                    formatCount(written.activeVoxels), formatBytes(session_.peakMemoryBytes()));
     session_.print(text);
 }
 

@@ -254,6 +254,11 @@ void SliceRun::writePngFile() {
 
 int SliceRun::run() {
     checkUsage();
+    session_.progress.declare({{Stage::reading, 1},
+                               {Stage::repairing, arguments_.repair.repair ? 1.0 : 0.0},
+                               {Stage::planning, 0.2},
+                               {Stage::sampling, 1},
+                               {Stage::writing, 0.5}});
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments_.repair);
     file_ = importMesh(arguments_.input, {sourceNames(choices_, {}), arguments_.timeStep}, repair, session_);
@@ -262,6 +267,7 @@ int SliceRun::run() {
     selection_ = selectFields(file_.mesh, choices_);
     exr_ ? selectAll() : selectForPng();
     timer.restart();
+    session_.execution.report(Stage::planning, 0, 1);
     const PlaneQuery query(file_.mesh, session_.execution);
     times_.indexMs = timer.restart();
     cut_ = planCut(file_.mesh, query, cutOptions_);
@@ -274,6 +280,7 @@ int SliceRun::run() {
         throw InputError(
             fmt::format("{}: no pixel's centre on the plane {} lies in the mesh: nothing to show",
                         arguments_.input, planeText(cut_)));
+    session_.execution.report(Stage::writing, 0, 1);
     exr_ ? writeExrFile() : writePngFile();
     times_.writeMs = timer.elapsedMs();
     printResult();
@@ -343,7 +350,7 @@ Json SliceRun::report() const {
                         {"hit", cut_.hits.elements.size()}};
     if (file_.repair) json["repair"] = repairJson(file_, repairOptions(arguments_.repair));
     json["statistics"] = statisticsJson(samples_.statistics);
-    json["peak_memory_bytes"] = peakMemoryBytes();
+    json["peak_memory_bytes"] = session_.peakMemoryBytes();
     return json;
 }
 

@@ -14,12 +14,15 @@ int runTets(const TetsArguments& arguments) {
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
     checkWritable(arguments.output);
+    session.progress.declare(
+        {{Stage::reading, 1}, {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0}, {Stage::writing, 1}});
     Timer timer;
     const std::optional<RepairOptions> repair = repairOptions(arguments.repair);
     const ImportedMesh file = importMesh(arguments.input, {{}, arguments.timeStep}, repair, session);
     StageTimes times;
     times.readMs = timer.restart();
     session.execution.throwIfCancelled();
+    session.execution.report(Stage::writing, 0, 1);
     writeTets(file.mesh, arguments.output);
     times.writeMs = timer.elapsedMs();
     session.print(importText(arguments.input, file.statistics, file.mesh.boundsWorld()));

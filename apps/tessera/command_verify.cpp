@@ -96,7 +96,7 @@ std::string comparisonText(const std::vector<Comparison>& rows) {
         table.push_back({r.field.empty() ? "(all)" : r.field, r.figure, fmt::format("{:.9g}", r.claimed),
                          fmt::format("{:.9g}", r.measured), fmt::format("{:.2g}", r.measured - r.claimed),
                          r.holds() ? "holds" : "DOES NOT HOLD"});
-    return formatTable(table);
+    return formatTable(table, {.keys = 2});
 }
 
 Json comparisonJson(const std::vector<Comparison>& rows) {
@@ -203,6 +203,7 @@ VoxelCheck check(const TetMesh& mesh, std::span<const int> fields, VdbFile& file
 int runVerify(const VerifyArguments& arguments) {
     checkOutputPaths({arguments.meshPath, arguments.vdbPath}, {{"--json", arguments.common.jsonPath}});
     Session session(arguments.common);
+    session.progress.declare({{Stage::reading, 1}, {Stage::measuring, 1}, {Stage::comparing, 1}});
     VdbFile file = readVdb(arguments.vdbPath);
     ReadOptions options;
     options.timeStep = arguments.timeStep;

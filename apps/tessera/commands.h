@@ -1,5 +1,6 @@
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "io/isolated_reader.h"
@@ -18,26 +19,45 @@ void printOut(const std::string& text);
 /// errno of the first thing that couldn't be printed; 0 as long as all could.
 int outputError();
 
-/// What a command runs with: threads, the flag that a signal raises, a progress bar, and how it reads.
+/// What a command runs with: threads, the flag that a signal raises, a line of progress, how it reads, and
+/// what it says.
 class Session {
   public:
     explicit Session(const CommonOptions& options);
     Execution execution;
-    ProgressBar progress;
+    ProgressLine progress;
 
     /// Reads a mesh, in a process of its own unless the options say otherwise; of a .pvd file the step that
     /// the options name. Throws as readMesh does.
-    MeshFile readMesh(const std::string& path, const ReadOptions& options) const;
+    MeshFile readMesh(const std::string& path, const ReadOptions& options);
 
     /// Prints to standard output, unless quiet or the JSON report goes there.
     void print(const std::string& text);
 
-    /// Prints one line to standard error, quiet or not.
+    /// Prints one line to standard error, unless quiet.
     void warn(const std::string& text);
 
+    /// The result isn't what was asked for: one line on standard error, quiet or not, and what --strict is
+    /// for.
+    void warnFellShort(const std::string& text);
+
+    /// What of an import's warnings wasn't said before, on another step of the series.
+    std::vector<std::string> unsaid(const std::vector<std::string>& warnings);
+
+    /// Largest memory of the run: of this process, or, where that is more, of the one that read a mesh and
+    /// this one together at that time.
+    std::int64_t peakMemoryBytes() const;
+
+    /// For a run that did all it was to do: 0, or with --strict 3 after warnFellShort.
+    int exitCode() const;
+
   private:
+    bool quiet_, strict_;
     bool prints_;
     bool isolated_;
+    bool fellShort_ = false;
+    std::int64_t readPeakBytes_ = 0;
+    std::set<std::string> said_;
     IsolationLimits limits_;
 };
 

@@ -10,7 +10,9 @@ namespace tessera {
 
 namespace {
 
-using Rows = std::vector<std::vector<std::string>>;
+using Rows = TableRows;
+
+constexpr const char* kOfRange = "of range";  // stays with the figure before it
 
 std::string number(double value) {
     return fmt::format("{:.3g}", value);
@@ -49,8 +51,8 @@ std::string coverageText(const CompareReport& report) {
 }
 
 std::string differencesText(const CompareReport& report) {
-    Rows rows{{"difference", "field", "on", "max", "of range", "99.9 %", "of range", "rms", "of range",
-               "max in thick elements", "of range"}};
+    Rows rows{{"difference", "field", "on", "max", kOfRange, "99.9 %", kOfRange, "rms", kOfRange,
+               "max in thick elements", kOfRange}};
     std::string places;
     for (std::size_t p = 0; p < report.pairs.size(); ++p)
         for (const ValueDifference& d : report.pairs[p].fields) {
@@ -60,17 +62,19 @@ std::string differencesText(const CompareReport& report) {
                             number(d.rms), share(d.rms, d.range), number(d.maxInThickElements),
                             share(d.maxInThickElements, d.range)});
             if (d.points > 0 && d.max > 0) {
-                places += fmt::format("  {}, {}: largest at {}, world ({:.9g}, {:.9g}, {:.9g})", label,
-                                      d.name, point(d.worst), d.worstWorld.x, d.worstWorld.y, d.worstWorld.z);
-                places += d.worstElement < 0 ? std::string("\n")
-                                             : fmt::format(", element {}, {:.3g} voxel thick\n",
-                                                           d.worstElement, d.worstThicknessVoxels);
+                places +=
+                    fmt::format("  {}, {}: largest at {}{}\n    world ({:.9g}, {:.9g}, {:.9g})\n", label,
+                                d.name, point(d.worst),
+                                d.worstElement < 0 ? std::string()
+                                                   : fmt::format(", element {}, {:.3g} voxel thick",
+                                                                 d.worstElement, d.worstThicknessVoxels),
+                                d.worstWorld.x, d.worstWorld.y, d.worstWorld.z);
             }
             if (d.validityDiffers > 0)
                 places += fmt::format("  {}, {}: at {} points only one of the two is finite\n", label, d.name,
                                       formatCount(d.validityDiffers));
         }
-    return formatTable(rows) + places;
+    return formatTable(rows, {.keys = 3, .glued = kOfRange}) + places;
 }
 
 std::string timesText(const CompareReport& report) {

@@ -96,7 +96,7 @@ std::optional<RepairOptions> repairOptions(const RepairArguments& a) {
 }
 
 ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
-                        const std::optional<RepairOptions>& options, const Session& session) {
+                        const std::optional<RepairOptions>& options, Session& session) {
     ImportedMesh file{session.readMesh(path, read), std::nullopt, 0};
     if (!options) return file;
     Timer timer;

@@ -21,7 +21,7 @@ std::optional<RepairOptions> repairOptions(const RepairArguments& arguments);
 
 /// Throws InputError as readMesh does, and when a repair leaves no element.
 ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
-                        const std::optional<RepairOptions>& repair, const Session& session);
+                        const std::optional<RepairOptions>& repair, Session& session);
 
 /// How many degenerate elements there are of each class; one line.
 std::string classesText(const ClassCounts& counts, const ClassLimits& limits);

@@ -14,6 +14,7 @@
 #include "command_line.h"
 #include "interrupt.h"
 #include "io/atomic_file.h"
+#include "progress.h"
 #include "report_text.h"
 
 namespace {
@@ -23,6 +24,7 @@ constexpr int kExitBadInput = 2;
 
 /// One line on standard error, whatever the message holds. Where it can't be written the exit code has to do.
 void printError(const char* message) {
+    const auto pause = tessera::pauseProgress();
     std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
 }
 

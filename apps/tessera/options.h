@@ -24,6 +24,7 @@ struct ReaderArguments {
 struct CommonOptions {
     int threads = 0;  ///< 0: one for every processor
     bool quiet = false;
+    bool strict = false;   ///< a result that isn't what was asked for is an exit code of its own
     std::string jsonPath;  ///< empty: no report; "-": standard output
     ReaderArguments reader;
 };

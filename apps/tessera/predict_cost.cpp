@@ -36,8 +36,7 @@ CostPrediction predictCost(const TetMesh& mesh, std::span<const int> fields, con
     const std::int64_t leaves = std::int64_t(tree.leafCount());
     if (leaves == 0) return cost;
     const auto bound = resampler.bind(mesh, fields, bind);
-    Execution silent = execution;
-    silent.progress = nullptr;
+    const Execution silent = execution.withoutProgress();
     // Every call passes over all elements once, whatever it samples: a call for one leaf tells that part, a
     // call for more the rest.
     const double fixedMs = sampleMs(*bound, tree, leaves, silent);

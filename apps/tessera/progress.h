@@ -1,31 +1,58 @@
 #pragma once
 
-#include <atomic>
-#include <cstdint>
+#include <condition_variable>
 #include <mutex>
 #include <string>
+#include <thread>
 
-#include "base/execution.h"
+#include "base/run_progress.h"
 #include "base/timer.h"
 
 namespace tessera {
 
-/// A progress bar on standard error: one line, redrawn a few times a second. Draws nothing unless standard
-/// error is a terminal.
-class ProgressBar : public ProgressSink {
+/// How far a run is, as one line on standard error: what it is at, which step of how many, the share of the
+/// whole, and the time left. Redrawn ten times a second at most, by a thread of its own, so also while the
+/// work reports nothing. Draws nothing unless standard error is a terminal.
+class ProgressLine {
   public:
-    explicit ProgressBar(bool enabled);
-    ~ProgressBar() override;
-    void update(std::string_view stage, std::int64_t done, std::int64_t total) override;
-    /// Wipes the line; call before printing anything else.
-    void clear();
+    explicit ProgressLine(bool wanted);
+    ~ProgressLine();
+    ProgressLine(const ProgressLine&) = delete;
+    ProgressLine& operator=(const ProgressLine&) = delete;
+
+    /// What work reports to; null when nothing is drawn.
+    ProgressSink* sink() { return enabled_ ? &run_ : nullptr; }
+
+    /// The stages of the run, or of every step of a series.
+    void declare(std::vector<ExpectedStage> stages) { run_.declare(std::move(stages)); }
+    /// The next step of a series begins.
+    /// @param words before the step's number: "step", "looking at step"; @param number from 1.
+    /// @param weight of this step over others, @param weightAfter of all that come behind it.
+    void beginStep(const std::string& words, std::size_t number, std::size_t count, double weight,
+                   double weightAfter);
+    /// About how long reading a file of this size takes.
+    void expectReading(double bytes);
 
   private:
+    void drawAgain();
+    void draw();
+
     bool enabled_;
-    std::mutex mutex_;
-    std::atomic<std::int64_t> nextDrawMs_{0};
     Timer clock_;
-    bool drawn_ = false;
+    RunProgress run_;
+    std::string step_;  // "step 3 of 20"
+    std::mutex stopMutex_;
+    std::condition_variable stopped_;
+    bool stop_ = false;
+    std::thread drawer_;
 };
+
+/// Wipes the line where one is drawn, and keeps it away for as long as the result lives: to be held by
+/// whatever prints.
+std::unique_lock<std::mutex> pauseProgress();
+
+/// The line's text, at most width - 1 columns.
+/// @param step "step 3 of 20", or empty.
+std::string progressText(const std::string& step, const ProgressState& state, std::size_t width);
 
 }  // namespace tessera

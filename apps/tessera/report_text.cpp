@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "io/name_list.h"
+
 namespace tessera {
 
 namespace {
@@ -17,13 +19,8 @@ std::string percent(double share) {
     return fmt::format("{:.3g} %", share * 100);
 }
 
-std::string rangeText(const std::vector<ValueRange>& ranges) {
-    std::string text;
-    for (const ValueRange& range : ranges) {
-        if (!text.empty()) text += "  ";
-        text += range.empty() ? "no finite value" : fmt::format("{:.6g} .. {:.6g}", range.min, range.max);
-    }
-    return text;
+std::string endText(const ValueRange& range, double value) {
+    return range.empty() ? "no value" : fmt::format("{:.6g}", value);
 }
 
 void appendCount(std::string& text, std::int64_t count, const char* what) {
@@ -31,24 +28,6 @@ void appendCount(std::string& text, std::int64_t count, const char* what) {
 }
 
 }  // namespace
-
-std::string formatTable(const std::vector<std::vector<std::string>>& rows) {
-    std::vector<std::size_t> widths;
-    for (const auto& row : rows) {
-        widths.resize(std::max(widths.size(), row.size()));
-        for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-    }
-    std::string text;
-    for (const auto& row : rows) {
-        std::string line;
-        for (std::size_t c = 0; c < row.size(); ++c)
-            line += c == 0 ? fmt::format("  {:<{}}", row[c], widths[c])
-                           : fmt::format("  {:>{}}", row[c], widths[c]);
-        line.erase(line.find_last_not_of(' ') + 1);
-        text += line + "\n";
-    }
-    return text;
-}
 
 std::string withoutControls(std::string text) {
     for (char& c : text)
@@ -84,35 +63,61 @@ std::string formatBytes(std::int64_t bytes) {
     return unit == 0 ? fmt::format("{} bytes", bytes) : fmt::format("{:.3g} {}", value, units[unit]);
 }
 
+std::string cellsText(const ImportStatistics& s) {
+    static constexpr const char* kNames[kCellKinds] = {"tetrahedra", "pyramids",    "wedges",
+                                                       "hexahedra",  "voxel cells", "polyhedra"};
+    const bool pureTets = s.cellsOfKind[std::size_t(CellKind::tet)] == s.cells;
+    if (pureTets && s.higherOrderCells == 0) return {};
+    std::string text;
+    for (const CellKind kind : {CellKind::hex, CellKind::voxel, CellKind::wedge, CellKind::pyramid,
+                                CellKind::polyhedron, CellKind::tet})
+        appendCount(text, s.cellsOfKind[std::size_t(kind)], kNames[std::size_t(kind)]);
+    if (s.higherOrderCells > 0)
+        text += s.higherOrderCells == s.cells
+                    ? ", of higher order and read by their corners"
+                    : fmt::format(", {} of them of higher order and read by their corners",
+                                  formatCount(s.higherOrderCells));
+    if (!pureTets) text += fmt::format(", split into {} tetrahedra", formatCount(s.elements));
+    return text + " (linear between corners; the cells' own interpolation can differ)";
+}
+
 std::string importText(const std::string& path, const ImportStatistics& s, const Box3d& bounds) {
     std::string text = fmt::format("{}: {}, {} cells, {} elements, {} nodes\n", path, s.format,
                                    formatCount(s.cells), formatCount(s.elements), formatCount(s.nodes));
-    text += fmt::format("  bounds {} to {}, edges {:.4g} to {:.4g}\n", place(bounds.min), place(bounds.max),
+    if (const std::string cells = cellsText(s); !cells.empty()) text += fmt::format("  {}\n", cells);
+    text += fmt::format("  bounds {} to {}\n  edges {:.4g} to {:.4g}\n", place(bounds.min), place(bounds.max),
                         s.smallestEdgeWorld, s.largestEdgeWorld);
     std::string oddities;
     appendCount(oddities, s.skippedCells, "other cells skipped");
     appendCount(oddities, s.blankedCells, "blanked cells left out");
     appendCount(oddities, s.flat, "flat elements");
-    appendCount(oddities, s.inverted, "inverted elements");
     appendCount(oddities, s.duplicate, "duplicate elements");
     appendCount(oddities, s.coincidentNodes, "coincident nodes");
     appendCount(oddities, s.nonConformingFaces, "non-conforming faces");
     if (!oddities.empty()) text += fmt::format("  {}\n", oddities);
+    if (s.inverted > 0)
+        text += fmt::format("  {} elements have the other orientation, which changes nothing\n",
+                            formatCount(s.inverted));
     if (s.elements > 0 && s.flat == s.elements) text += "  nothing to sample: every element is flat\n";
     for (const std::string& warning : s.warnings) text += fmt::format("  warning: {}\n", warning);
     return text;
 }
 
 std::string fieldsText(const std::vector<FieldSummary>& fields) {
-    std::vector<std::vector<std::string>> rows{{"field", "on", "components", "range"}};
-    for (const FieldSummary& f : fields)
-        rows.push_back({f.name, f.location == "point" ? "points" : "cells", std::to_string(f.ranges.size()),
-                        rangeText(f.ranges)});
+    // A line a component: nine ranges are wider than any terminal.
+    TableRows rows{{"field", "on", "components", "from", "to"}};
+    for (const FieldSummary& f : fields) {
+        const std::string on = f.location == "point" ? "points" : "cells";
+        for (std::size_t c = 0; c < f.ranges.size(); ++c)
+            rows.push_back({c == 0 ? f.name : "", c == 0 ? on : "",
+                            c == 0 ? std::to_string(f.ranges.size()) : "",
+                            endText(f.ranges[c], f.ranges[c].min), endText(f.ranges[c], f.ranges[c].max)});
+    }
     return formatTable(rows);
 }
 
 std::string levelsText(const std::vector<LevelSummary>& levels) {
-    std::vector<std::vector<std::string>> rows{{"level", "spacing", "bricks", "voxels", "in the mesh"}};
+    TableRows rows{{"level", "spacing", "bricks", "voxels", "in the mesh"}};
     LevelSummary all;
     for (const LevelSummary& l : levels) {
         rows.push_back({std::to_string(l.level), fmt::format("{:.6g}", l.spacingWorld), formatCount(l.bricks),
@@ -126,32 +131,46 @@ std::string levelsText(const std::vector<LevelSummary>& levels) {
     return formatTable(rows);
 }
 
+/// "a 12, b 7" of the fields that have such a count.
+template <class Count>
+std::string countsByField(const ErrorReport& report, const Count& countOf) {
+    std::vector<std::string> counts;
+    for (const FieldError& f : report.fields)
+        if (const std::int64_t count = countOf(f); count > 0)
+            counts.push_back(fmt::format("{} {}", f.name, formatCount(count)));
+    return nameList(counts);
+}
+
 std::string errorText(const ErrorReport& report) {
-    std::vector<std::vector<std::string>> rows{
-        {"error", "max", "of range", "99.9 %", "of range", "rms", "of range", "worst at"}};
+    const char* const share = "of range";
+    TableRows rows{{"error", "max", share, "99.9 %", share, "rms", share}},
+        places{{"largest error of", "at"}};
+    std::vector<std::string> without;
     for (const FieldError& f : report.fields) {
         if (f.samples == 0) {
-            rows.push_back({f.name, "-", "-", "-", "-", "-", "-", "-"});
+            without.push_back(f.name);
             continue;
         }
-        const bool constant = f.range == 0;
-        const auto share = [&](double value) { return constant ? std::string("-") : percent(value); };
-        rows.push_back({f.name, fmt::format("{:.4g}", f.max), share(f.relativeMax),
-                        fmt::format("{:.4g}", f.p999), share(f.relativeP999), fmt::format("{:.4g}", f.rms),
-                        share(f.relativeRms), place(f.worstPlaceWorld)});
+        const auto ofRange = [&](double value) { return f.range == 0 ? std::string("-") : percent(value); };
+        rows.push_back({f.name, fmt::format("{:.4g}", f.max), ofRange(f.relativeMax),
+                        fmt::format("{:.4g}", f.p999), ofRange(f.relativeP999), fmt::format("{:.4g}", f.rms),
+                        ofRange(f.relativeRms)});
+        places.push_back({f.name, place(f.worstPlaceWorld)});
     }
-    std::string text = formatTable(rows);
+    std::string text;
+    if (rows.size() > 1) text += formatTable(rows, {.glued = share}) + formatTable(places);
+    if (!without.empty())
+        text += fmt::format("  without a finite value, so without an error: {}\n", nameList(without));
     text += fmt::format(
         "  measured at {} nodes and {} centroids; {} of them in cells wholly inside the mesh\n",
         formatCount(report.nodes), formatCount(report.centroids), percent(report.fullyCoveredShare));
-    for (const FieldError& f : report.fields) {
-        if (f.skippedSamples > 0)
-            text += fmt::format("  {}: {} samples without a finite value were left out\n", f.name,
-                                formatCount(f.skippedSamples));
-        if (f.validPoints < report.coveredPoints)
-            text += fmt::format("  {}: {} voxels in the mesh have no finite value\n", f.name,
-                                formatCount(report.coveredPoints - f.validPoints));
-    }
+    const std::string skipped =
+        countsByField(report, [](const FieldError& f) { return f.samples > 0 ? f.skippedSamples : 0; });
+    if (!skipped.empty()) text += fmt::format("  left out, without a finite value: samples of {}\n", skipped);
+    const std::string invalid = countsByField(report, [&](const FieldError& f) {
+        return f.samples > 0 ? report.coveredPoints - f.validPoints : 0;
+    });
+    if (!invalid.empty()) text += fmt::format("  voxels in the mesh without a finite value: {}\n", invalid);
     if (report.outsideBricks > 0)
         text += fmt::format("  {} samples lie outside the bounds and don't count\n",
                             formatCount(report.outsideBricks));
@@ -161,7 +180,7 @@ std::string errorText(const ErrorReport& report) {
 std::string stagesText(const StageTimes& t) {
     std::string text = fmt::format("  read {:.0f} ms, plan {:.0f} ms, resample {:.0f} ms, verify {:.0f} ms",
                                    t.readMs, t.planMs, t.resampleMs, t.verifyMs);
-    if (t.extendMs > 0) text += fmt::format(", extend {:.0f} ms", t.extendMs);
+    if (t.extendMs >= 0.5) text += fmt::format(", extend {:.0f} ms", t.extendMs);
     return text + fmt::format(", write {:.0f} ms\n", t.writeMs);
 }
 

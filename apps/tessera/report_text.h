@@ -4,11 +4,10 @@
 #include <vector>
 
 #include "run_report.h"
+#include "table_text.h"
 
 namespace tessera {
 
-/// Rows of cells as aligned columns; the first row is the heading, the first column is left-aligned.
-std::string formatTable(const std::vector<std::vector<std::string>>& rows);
 /// 1234567 -> "1,234,567".
 std::string formatCount(std::int64_t count);
 /// Bytes with a unit, e.g. "12.3 MB".

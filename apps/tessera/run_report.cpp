@@ -23,6 +23,13 @@ Json rangeJson(const ValueRange& range) {
     return range.empty() ? Json(nullptr) : Json::array({range.min, range.max});
 }
 
+Json cellTypesJson(const ImportStatistics& s) {
+    const auto count = [&](CellKind kind) { return s.cellsOfKind[std::size_t(kind)]; };
+    return {{"tetrahedra", count(CellKind::tet)}, {"pyramids", count(CellKind::pyramid)},
+            {"wedges", count(CellKind::wedge)},   {"hexahedra", count(CellKind::hex)},
+            {"voxels", count(CellKind::voxel)},   {"polyhedra", count(CellKind::polyhedron)}};
+}
+
 Json fieldsJson(const std::vector<FieldSummary>& fields) {
     Json list = Json::array();
     for (const FieldSummary& field : fields) {
@@ -82,6 +89,7 @@ Json meshJson(const ImportStatistics& s, const Box3d& bounds, const std::vector<
             {"nodes", s.nodes},
             {"elements", s.elements},
             {"cells", s.cells},
+            {"cell_types", cellTypesJson(s)},
             {"skipped_cells", s.skippedCells},
             {"blanked_cells", s.blankedCells},
             {"higher_order_cells", s.higherOrderCells},

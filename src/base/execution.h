@@ -3,16 +3,31 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <string_view>
 
 namespace tessera {
 
-/// Receives progress of long work. Called from any thread; must not block.
+/// What a run is at.
+enum class Stage : std::uint8_t {
+    reading,
+    repairing,
+    planning,
+    sampling,
+    checking,   ///< measuring the error of what was sampled last, between rounds of refinement
+    measuring,  ///< measuring the error of everything
+    comparing,
+    extending,  ///< finding values outside the mesh
+    writing
+};
+
+/// Receives progress of long work. Called from any thread, for every item; must not block.
 class ProgressSink {
   public:
     virtual ~ProgressSink() = default;
-    /// @param stage a short word such as "resample"; @param done, total units of work of that stage.
-    virtual void update(std::string_view stage, std::int64_t done, std::int64_t total) = 0;
+    /// @param done of `total` items of a stage, which begins with its first call.
+    virtual void update(Stage stage, std::int64_t done, std::int64_t total) = 0;
+    /// Sampling is about to begin, maybe anew: what it samples now, and about how much more in rounds to
+    /// come. Called between stages, in units that are the same for a whole run.
+    virtual void beginRound(double /*now*/, double /*later*/) {}
 };
 
 /// How long work runs: threads, cancellation, progress. Results never depend on it.
@@ -23,9 +38,14 @@ struct Execution {
 
     int threadCount() const;
     void throwIfCancelled() const;
-    void report(std::string_view stage, std::int64_t done, std::int64_t total) const {
+    void report(Stage stage, std::int64_t done, std::int64_t total) const {
         if (progress) progress->update(stage, done, total);
     }
+    void beginRound(double now, double later) const {
+        if (progress) progress->beginRound(now, later);
+    }
+    /// For the parts of work whose progress the caller reports itself.
+    Execution withoutProgress() const { return {threads, cancel, nullptr}; }
 };
 
 /// Calls body(i) once for every i in [0, count), in any order, on any thread. The first exception stops the

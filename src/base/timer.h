@@ -23,5 +23,7 @@ class Timer {
 
 /// Largest resident set of this process so far, in bytes (0 where the system doesn't tell).
 long long peakMemoryBytes();
+/// What it holds now.
+long long residentMemoryBytes();
 
 }  // namespace tessera

@@ -122,7 +122,7 @@ class Flattener {
                 copyLeaf(std::size_t(leaf), brick, flat);
             else
                 takeFiner(flatTree.ownedPoints(flatTree.leaves()[brick]), brick, flat);
-            execution_.report("flatten", ++done, total);
+            execution_.report(Stage::extending, ++done, total);
         });
         if (coarse.empty()) return;
         std::vector<IndexBox> boxes;
@@ -130,7 +130,7 @@ class Flattener {
             boxes.push_back(flatTree.ownedPoints(flatTree.leaves()[brick]));
         coverage(tree_.lattice(level_), boxes, [&](std::size_t box, const Block& block) {
             interpolateBrick(block, coarse[box], flatTree.leaves()[coarse[box]], flat);
-            execution_.report("flatten", ++done, total);
+            execution_.report(Stage::extending, ++done, total);
         });
     }
 

@@ -193,15 +193,13 @@ ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const
     const SampledMesh& samples = options.samples ? *options.samples : *own;
     TESSERA_CHECK(samples.fields().size() == fields.size() && samples.channels() == store.channels(),
                   "the samples are for these fields");
-    execution.report("verify", 0, 3);
+    execution.report(Stage::measuring, 0, 1);
     const SampleErrors errors = measureSamples(samples, tree, store, reconstruction, options.boundsWorld,
                                                execution, options.leafErrors);
-    execution.report("verify", 1, 3);
     ErrorReport report;
     countSamples(errors, report);
     const StoredSums stored = sumStored(samples.fields(), tree, store, execution);
     report.coveredPoints = stored.covered;
-    execution.report("verify", 2, 3);
     for (std::size_t f = 0; f < fields.size(); ++f) {
         report.fields.push_back(fieldReport(samples, f, errors, execution));
         FieldError& result = report.fields.back();
@@ -209,7 +207,7 @@ ErrorReport measureError(const TetMesh& mesh, std::span<const int> fields, const
         const auto first = stored.sum.begin() + samples.fields()[f].firstChannel;
         result.integralLattice.assign(first, first + result.components);
     }
-    execution.report("verify", 3, 3);
+    execution.report(Stage::measuring, 1, 1);
     return report;
 }
 

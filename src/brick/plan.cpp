@@ -164,7 +164,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
                          " voxels, more than " + budgetText(options, maxLeaves) +
                          "; smaller bricks, a larger spacing or smaller bounds need fewer");
     for (int depth = 0; depth < frame.maxDepth; ++depth) {
-        execution.report("plan", depth, frame.maxDepth);
+        execution.report(Stage::planning, depth, frame.maxDepth);
         const auto leaves = plan.leaves();
         std::vector<std::uint8_t> wanted(leaves.size(), 0);
         parallelFor(execution, std::int64_t(leaves.size()), [&](std::int64_t i) {
@@ -199,12 +199,12 @@ BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Ex
     const Box3d meshBox = meshBounds(mesh, execution);
     checkOptions(mesh, meshBox, options);
     TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");
-    execution.report("plan", 0, 1);
+    execution.report(Stage::planning, 0, 1);
     const std::size_t maxLeaves = leafBudget(options, channels);
     BrickTree tree = options.criterion == Criterion::uniform
                          ? planUniform(mesh, meshBox, options, maxLeaves, execution)
                          : planByElementSize(mesh, meshBox, options, maxLeaves, execution, notes);
-    execution.report("plan", 1, 1);
+    execution.report(Stage::planning, 1, 1);
     return tree;
 }
 

@@ -1,6 +1,7 @@
 #include "brick/refine.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -139,6 +140,7 @@ class ErrorRefinement {
     void takeSamples();
     void sampleNewLeaves();
     void measureChanged();
+    double expectedLater(double now) const;
     std::vector<BrickKey> wanted(std::size_t limit) const;
     bool refine();
     double totalMeanSquare() const;
@@ -168,6 +170,8 @@ class ErrorRefinement {
     BrickTimes times_;
     std::string stopped_;
     int rounds_ = 0;
+    double sampledBefore_ = 0;  // leaves that the last round sampled
+    double worstRatio_ = 0;     // before the last split
 };
 
 // Gives every sample to the root brick that it lies in.
@@ -204,8 +208,23 @@ void ErrorRefinement::sampleNewLeaves() {
     }
     store_ = std::move(next);
     times_.planMs += timer.restart();
+    const auto now = double(missing.size());
+    execution_.beginRound(now, expectedLater(now));
+    sampledBefore_ = now;
     resampleLeaves(tree_, missing, *bound_, store_, execution_, statistics_);
     times_.resampleMs += timer.elapsedMs();
+}
+
+// About how many leaves the rounds behind this one will sample, for progress alone: a level quarters the
+// error, and each round grows or shrinks as this one did over the last.
+double ErrorRefinement::expectedLater(double now) const {
+    constexpr double kFirstGuess = 8;
+    if (sampledBefore_ == 0) return kFirstGuess * now;
+    const double growth = std::clamp(now / sampledBefore_, 0.5, 4.0);
+    double later = 0, round = now;
+    for (double ratio = worstRatio_ / 4; ratio > 1 && later < double(budgetLeaves_); ratio /= 4)
+        later += round *= growth;
+    return std::min(later, double(budgetLeaves_));
 }
 
 bool ErrorRefinement::touchesFresh(std::size_t leaf) const {
@@ -255,14 +274,16 @@ void ErrorRefinement::measureChanged() {
     if (rounds_ == 0) buildIfNeeded(nearest_, store_);
     const Reconstruction reconstruction(mesh_, fields_, tree_, store_, nearest_);
     constexpr std::int64_t kChunk = 16;
-    parallelForChunks(execution_, std::int64_t(leaves_.size()), kChunk,
-                      [&](std::int64_t begin, std::int64_t end) {
-                          LeafSampler sampler(samples_, tree_, store_, reconstruction);
-                          for (std::int64_t i = begin; i < end; ++i)
-                              if (touchesFresh(std::size_t(i)))
-                                  leaves_[std::size_t(i)]->ratio =
-                                      leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
-                      });
+    const auto count = std::int64_t(leaves_.size());
+    std::atomic<std::int64_t> done{0};
+    execution_.report(Stage::checking, 0, count);
+    parallelForChunks(execution_, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        LeafSampler sampler(samples_, tree_, store_, reconstruction);
+        for (std::int64_t i = begin; i < end; ++i)
+            if (touchesFresh(std::size_t(i)))
+                leaves_[std::size_t(i)]->ratio = leafRatio(std::size_t(i), *leaves_[std::size_t(i)], sampler);
+        execution_.report(Stage::checking, done += end - begin, count);
+    });
     times_.verifyMs += timer.elapsedMs();
 }
 
@@ -311,6 +332,8 @@ bool ErrorRefinement::refine() {
     Timer timer;
     std::vector<BrickKey> keys = wanted(std::numeric_limits<std::size_t>::max());
     const bool any = !keys.empty();
+    worstRatio_ = 0;
+    for (const PlannedBrick* leaf : leaves_) worstRatio_ = std::max(worstRatio_, leaf->ratio);
     bool done = false;
     while (!keys.empty() && !(done = plan_.split(keys, budgetLeaves_, execution_))) {
         stopped_ =
@@ -406,6 +429,7 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
                               const RefineOptions& options, const Execution& execution) {
     Timer timer;
     if (options.criterion == Criterion::error) {
+        execution.report(Stage::planning, 0, 1);
         checkOptions(mesh, meshBounds(mesh, execution), options);
         ErrorRefinement refinement(mesh, fields, resampler, options, execution);
         const double setupMs = timer.elapsedMs();
@@ -420,6 +444,7 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
     result.times.planMs = timer.restart();
     const auto bound = resampler.bind(mesh, fields, options.bind);
     result.target = bound->target();
+    execution.beginRound(double(result.tree.leafCount()), 0);
     result.store = resampleTree(result.tree, *bound, channels, execution, result.statistics);
     cropToKept(result.tree, keptPoints(result.tree, options), result.store);
     result.times.resampleMs = timer.restart();

@@ -71,7 +71,8 @@ void resampleLeaves(const BrickTree& tree, std::span<const std::size_t> leaves, 
                     BrickStore& store, const Execution& execution, ResampleStatistics& statistics) {
     std::atomic<std::int64_t> done{0};
     const std::int64_t total = std::int64_t(leaves.size());
-    execution.report("resample", 0, total);
+    execution.report(Stage::sampling, 0, total);
+    const Execution silent = execution.withoutProgress();
     const int edge = groupBricks(tree.brickCells(), store.channels());
     std::vector<std::vector<std::size_t>> byLevel(std::size_t(tree.levelCount()));
     for (const std::size_t leaf : leaves) byLevel[std::size_t(tree.leaves()[leaf].level)].push_back(leaf);
@@ -85,9 +86,9 @@ void resampleLeaves(const BrickTree& tree, std::span<const std::size_t> leaves, 
         const auto sink = [&](std::size_t box, const Block& block) {
             for (const std::size_t leaf : groups[box].leaves) store.put(leaf, tree.leaves()[leaf], block);
             const std::int64_t count = std::int64_t(groups[box].leaves.size());
-            execution.report("resample", done += count, total);
+            execution.report(Stage::sampling, done += count, total);
         };
-        statistics += resampler.resample(tree.lattice(level), boxes, sink, execution);
+        statistics += resampler.resample(tree.lattice(level), boxes, sink, silent);
     }
 }
 

@@ -74,6 +74,7 @@ class Measurement {
     void addWeighted(std::size_t f, std::size_t sample, double weight, FieldSums& sums) const;
     double centroidWeight(const SampledField& field) const { return field.isCell() ? 1 : kCentroidWeight; }
     void measureDeferred(std::vector<Part>& parts);
+    void advance(std::int64_t pieces);
     Part newPart() const;
     void addSums(const std::vector<Part>& parts, SampleErrors& result) const;
 
@@ -87,6 +88,7 @@ class Measurement {
     std::optional<Box3d> bounds_;  // from the tree's origin
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
+    std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
 };
 
 Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, const BrickStore& store,
@@ -103,6 +105,12 @@ Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, cons
       lists_(samples.fields().size(), std::vector<float>(samples.count(), -1.0f)) {
     if (boundsWorld)
         bounds_ = Box3d{boundsWorld->min - tree.originWorld(), boundsWorld->max - tree.originWorld()};
+}
+
+// A sample is two pieces of work, the second one done at once unless it is deferred.
+void Measurement::advance(std::int64_t pieces) {
+    const std::int64_t all = 2 * (mesh_.nodeCount() + mesh_.elementCount());
+    execution_.report(Stage::measuring, done_ += pieces, all);
 }
 
 Part Measurement::newPart() const {
@@ -254,6 +262,7 @@ std::vector<Part> Measurement::measureNodes(const std::vector<std::uint8_t>& use
             measureBatch(batch, part);
             batch.count = 0;
         }
+        advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
     });
     measureDeferred(parts);
     return parts;
@@ -324,6 +333,7 @@ std::vector<Part> Measurement::measureElements() {
                 }
             }
         }
+        advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
     });
     measureDeferred(parts);
     return parts;
@@ -362,6 +372,7 @@ void Measurement::measureDeferred(std::vector<Part>& parts) {
                     addWeighted(f, all[i].sample, centroidWeight(samples_.fields()[f]) * all[i].volume,
                                 part.sums[f]);
             }
+            advance(std::int64_t(runs[std::size_t(run) + 1] - runs[std::size_t(run)]));
         }
     });
 }

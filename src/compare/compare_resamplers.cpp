@@ -106,7 +106,9 @@ CompareReport compareResamplers(const TetMesh& mesh, std::span<const int> fields
     const std::vector<IndexBox> boxes = cutIntoBoxes(grid.points, options.boxEdge);
     report.boxes = boxes.size();
     std::vector<std::unique_ptr<BoundResampler>> bound;
+    const Execution quiet = execution.withoutProgress();
     for (const Contestant& c : contestants) {
+        execution.report(Stage::sampling, std::int64_t(bound.size()), std::int64_t(contestants.size()));
         Timer timer;
         bound.push_back(c.resampler->bind(mesh, fields, c.options));
         ContestantReport result;
@@ -117,20 +119,18 @@ CompareReport compareResamplers(const TetMesh& mesh, std::span<const int> fields
         result.classification = c.options.classification;
         result.spillVoxels = c.resampler->spillBoundVoxels();
         result.placeVoxels = c.resampler->placeBoundVoxels();
-        result.times = timeRuns(*bound.back(), grid.lattice, boxes, options.runs, execution);
+        result.times = timeRuns(*bound.back(), grid.lattice, boxes, options.runs, quiet);
         report.contestants.push_back(std::move(result));
     }
     Comparison comparison(mesh, fields, grid, options, execution, report);
     std::vector<Block> blocks(contestants.size());
-    Execution quiet = execution;
-    quiet.progress = nullptr;
     for (std::size_t b = 0; b < boxes.size(); ++b) {
         for (std::size_t c = 0; c < bound.size(); ++c)
             bound[c]->resample(
                 grid.lattice, std::span(&boxes[b], 1),
                 [&](std::size_t, const Block& block) { blocks[c] = block; }, quiet);
         comparison.addBox(blocks);
-        execution.report("compare", std::int64_t(b + 1), std::int64_t(boxes.size()));
+        execution.report(Stage::comparing, std::int64_t(b + 1), std::int64_t(boxes.size()));
     }
     comparison.finish();
     return report;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "io/name_list.h"
 #include "io/raw_mesh.h"
 #include "mesh/mesh_quality.h"
 
@@ -151,6 +152,15 @@ void joinAcrossParts(RawBlock& all, const std::vector<std::size_t>& firstPoint, 
         if (field.location == FieldLocation::point) gatherTuples(field, joined.kept, execution);
 }
 
+/// One warning for all fields of which the same is to be said.
+void warnOfFields(const std::vector<std::string>& names, const std::string& what,
+                  ImportStatistics& statistics) {
+    if (names.size() == 1) statistics.warnings.push_back("Field '" + names[0] + "' is " + what + ".");
+    if (names.size() > 1)
+        statistics.warnings.push_back(std::to_string(names.size()) + " fields are " + what + ": " +
+                                      nameList(names) + ".");
+}
+
 /// One block with points, cells and fields of all; cell fields have one tuple for every listed cell.
 RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const ReadOptions& options,
                      const Execution& execution) {
@@ -228,26 +238,34 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const ReadOptions& o
         cellBase += block.cells.kinds.size();
         block = {};
     }
-    for (const auto& [location, name] : partial)
-        raw.statistics.warnings.push_back(
-            "Field '" + name + "' is absent in some " + (firstPointOfPart.size() > 1 ? "parts" : "blocks") +
-            " or has another number of components there; its values are NaN in these.");
+    std::vector<std::string> partialNames;
+    for (const auto& [location, name] : partial) partialNames.push_back(name);
+    warnOfFields(partialNames,
+                 std::string("absent in some ") + (firstPointOfPart.size() > 1 ? "parts" : "blocks") +
+                     " or of another number of components there: NaN in these",
+                 raw.statistics);
     if (firstPointOfPart.size() > 1) joinAcrossParts(all, firstPointOfPart, raw.statistics, execution);
     return all;
 }
 
 /// Gives a cell field another name when a point field has the same, so that names are unique.
 void renameTwins(RawBlock& block, ImportStatistics& statistics) {
+    std::vector<std::string> twins, newNames;
     std::set<std::string> pointNames;
     for (const ArrayInfo& array : block.arrays)
         if (array.location == FieldLocation::point) pointNames.insert(array.name);
     for (Field& field : block.fields) {
         if (field.location != FieldLocation::cell || !pointNames.contains(field.name)) continue;
-        const std::string name = cellFieldName(field.name);
-        statistics.warnings.push_back("Both points and cells have a field '" + field.name +
-                                      "'; that of the cells is called '" + name + "'.");
-        field.name = name;
+        twins.push_back(field.name);
+        newNames.push_back(field.name = cellFieldName(field.name));
     }
+    if (!twins.empty())
+        statistics.warnings.push_back(
+            twins.size() == 1 ? "Both points and cells have a field '" + twins[0] +
+                                    "'; that of the cells is called '" + newNames[0] + "'."
+                              : "Points and cells both have " + std::to_string(twins.size()) +
+                                    " fields of one name: " + nameList(twins) +
+                                    "; those of the cells are called " + nameList(newNames) + ".");
     for (ArrayInfo& array : block.arrays)
         if (array.location == FieldLocation::cell && pointNames.contains(array.name))
             array.name = cellFieldName(array.name);
@@ -284,10 +302,8 @@ void warnSkippedArrays(const RawBlock& block, ImportStatistics& statistics) {
         else if (array.components > 9 || array.components < 1)
             wide.insert(array.name);
     }
-    for (const std::string& name : wide)
-        statistics.warnings.push_back("Field '" + name + "' is left out: fields have 1 to 9 components.");
-    for (const std::string& name : text)
-        statistics.warnings.push_back("Field '" + name + "' is left out: it isn't numeric.");
+    warnOfFields({wide.begin(), wide.end()}, "left out: fields have 1 to 9 components", statistics);
+    warnOfFields({text.begin(), text.end()}, "left out: only numbers can be resampled", statistics);
 }
 
 /// Appends the means for added nodes to a point field.
@@ -349,15 +365,14 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     ImportStatistics& statistics = raw.statistics;
     statistics.blocks = std::int64_t(raw.blocks.size());
     statistics.cells = 0;
-    for (const RawBlock& block : raw.blocks) statistics.cells += block.cells.cellCount();
+    for (const RawBlock& block : raw.blocks) {
+        statistics.cells += block.cells.cellCount();
+        for (const CellKind kind : block.cells.kinds) ++statistics.cellsOfKind[std::size_t(kind)];
+    }
     if (statistics.cells == 0)
         throw InputError(name + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
                          " others: points, lines, surfaces or unknown; " +
                          std::to_string(statistics.blankedCells) + " blanked or ghost cells)");
-    if (statistics.higherOrderCells > 0)
-        statistics.warnings.push_back(
-            std::to_string(statistics.higherOrderCells) + " of " + std::to_string(statistics.cells) +
-            " cells are of higher order; they are read by their corner nodes only, as linear cells.");
     RawBlock block = mergeBlocks(path, raw, options, execution);
     renameTwins(block, statistics);
     selectFields(name, block, options);

@@ -118,7 +118,7 @@ void writeExr(const std::string& path, const ExrImage& image, const Execution& e
         output.setFrameBuffer(pixels);
         for (int y = 0; y < image.height; y += kRowsAtOnce) {
             execution.throwIfCancelled();
-            execution.report("write", y, image.height);
+            execution.report(Stage::writing, y, image.height);
             output.writePixels(std::min(kRowsAtOnce, image.height - y));
         }
     } catch (const Iex::BaseExc& error) {

@@ -181,10 +181,16 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
 MeshFile IsolatedReading::takeMesh(ReaderProcess& process) {
     const ReportStart answer = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
+    const std::int64_t heldBytes = residentMemoryBytes();
+    const auto unpack = [&](std::span<const std::byte> packet) {
+        MeshFile file = readPacket(packet, execution_);
+        file.readPeakBytes += heldBytes;
+        return file;
+    };
     try {
-        if (answer.outcome == ReaderOutcome::meshFollows) return readPacket(rest, execution_);
+        if (answer.outcome == ReaderOutcome::meshFollows) return unpack(rest);
         if (answer.outcome == ReaderOutcome::meshInMemory)
-            return readPacket(SealedMemory(process.mesh()).bytes(), execution_);
+            return unpack(SealedMemory(process.mesh()).bytes());
     } catch (const DamagedPacket& damage) {
         failWithGarbage(damage.what());
     }

@@ -25,8 +25,10 @@ struct PacketStart {
 /// Calls visit(member) for every number of the statistics, always in one order.
 template <class Statistics, class Visit>
 void visitNumbers(Statistics& s, const Visit& visit) {
-    static_assert(sizeof(ImportStatistics) == sizeof(std::string) + 18 * 8 + sizeof(std::vector<std::string>),
+    static_assert(sizeof(ImportStatistics) ==
+                      sizeof(std::string) + (18 + kCellKinds) * 8 + sizeof(std::vector<std::string>),
                   "a new member of ImportStatistics needs its line below");
+    for (auto& count : s.cellsOfKind) visit(count);
     visit(s.cells), visit(s.skippedCells), visit(s.blankedCells), visit(s.higherOrderCells);
     visit(s.blocks), visit(s.addedNodes), visit(s.nodes), visit(s.elements);
     visit(s.flat), visit(s.inverted), visit(s.duplicate), visit(s.coincidentNodes);
@@ -96,6 +98,7 @@ std::string headOf(const MeshFile& file) {
         head.put(std::int64_t(field.location == FieldLocation::point ? 0 : 1));
         head.put(std::int64_t(field.components));
     }
+    head.put(file.readPeakBytes);
     head.put(file.statistics.format);
     visitNumbers(file.statistics, [&](auto number) { head.put(number); });
     head.put(std::int64_t(file.statistics.warnings.size()));
@@ -118,6 +121,7 @@ MeshFile readHead(std::span<const std::byte> bytes, std::int64_t& nodes, std::in
         field.components = int(head.getCount(9, "components in a field"));
         if (field.components == 0) throw DamagedPacket("a field has no components");
     }
+    file.readPeakBytes = head.getCount(std::int64_t(1) << 60, "bytes of memory");
     file.statistics.format = head.getText();
     visitNumbers(file.statistics,
                  [&](auto& number) { number = head.get<std::remove_reference_t<decltype(number)>>(); });

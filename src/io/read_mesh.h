@@ -1,22 +1,25 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "base/execution.h"
+#include "mesh/split_cells.h"
 #include "mesh/tet_mesh.h"
 
 namespace tessera {
 
 /// What was found while reading and splitting; counts are of elements (tets) unless they say cells or nodes.
 struct ImportStatistics {
-    std::string format;                 ///< e.g. "VTK XML unstructured grid"
-    std::int64_t cells = 0;             ///< 3D cells read
-    std::int64_t skippedCells = 0;      ///< points, lines, surfaces and unsupported cells
-    std::int64_t blankedCells = 0;      ///< blanked, hidden or ghost: left out
-    std::int64_t higherOrderCells = 0;  ///< read by their corner nodes only
+    std::string format;                                  ///< e.g. "VTK XML unstructured grid"
+    std::int64_t cells = 0;                              ///< 3D cells read
+    std::array<std::int64_t, kCellKinds> cellsOfKind{};  ///< of these, by CellKind
+    std::int64_t skippedCells = 0;                       ///< points, lines, surfaces and unsupported cells
+    std::int64_t blankedCells = 0;                       ///< blanked, hidden or ghost: left out
+    std::int64_t higherOrderCells = 0;                   ///< read by their corner nodes only
     std::int64_t blocks = 1;
     std::int64_t addedNodes = 0;  ///< centres added to split polyhedra
     std::int64_t nodes = 0;
@@ -44,6 +47,8 @@ struct ReadOptions {
 struct MeshFile {
     TetMesh mesh;
     ImportStatistics statistics;
+    /// Where another process read it: the most memory that one held, and what this one held then. Else 0.
+    std::int64_t readPeakBytes = 0;
 };
 
 /// Reads a mesh in any supported format (docs/formats in README): cells are split into tetrahedra so that

@@ -8,6 +8,7 @@
 #include <vtkNew.h>
 #include <vtkSmartPointer.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkXMLDataElement.h>
 #include <vtkXMLImageDataReader.h>
 #include <vtkXMLMultiBlockDataReader.h>
 #include <vtkXMLPImageDataReader.h>
@@ -18,9 +19,15 @@
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
+#include <algorithm>
+#include <map>
+#include <memory>
 #include <new>
+#include <set>
+#include <string_view>
 
 #include "base/error.h"
+#include "io/name_list.h"
 #include "io/vtk_convert.h"
 #include "io/vtk_messages.h"
 #include "io/vtk_source.h"
@@ -30,15 +37,70 @@ namespace tessera {
 
 namespace {
 
+/// Visits the arrays of one <PointData> or <CellData>.
+void renameArrays(vtkXMLDataElement* attributes, RenamedFields& renamed) {
+    std::set<std::string> taken;
+    const int count = attributes->GetNumberOfNestedElements();
+    for (int i = 0; i < count; ++i)
+        if (const char* name = attributes->GetNestedElement(i)->GetAttribute("Name")) taken.insert(name);
+    std::set<std::string> seen;
+    for (int i = 0; i < count; ++i) {
+        vtkXMLDataElement* array = attributes->GetNestedElement(i);
+        const char* given = array->GetAttribute("Name");
+        if (!given || seen.insert(given).second) continue;
+        const std::string name = given;
+        std::string unique;
+        for (int number = 2; unique.empty() || !taken.insert(unique).second; ++number)
+            unique = name + "_" + std::to_string(number);
+        array->SetAttribute("Name", unique.c_str());
+        seen.insert(unique);
+        if (std::find(renamed.newNames.begin(), renamed.newNames.end(), unique) != renamed.newNames.end())
+            continue;  // in another piece, or of the points too
+        renamed.newNames.push_back(unique);
+        if (std::find(renamed.names.begin(), renamed.names.end(), name) == renamed.names.end())
+            renamed.names.push_back(name);
+    }
+}
+
+/// Gives every array of points, and of cells, a name of its own: the second T becomes T_2 in every piece.
+void makeNamesUnique(vtkXMLDataElement* element, RenamedFields& renamed) {
+    const std::string_view name = element->GetName() ? element->GetName() : "";
+    if (name == "PointData" || name == "CellData") return renameArrays(element, renamed);
+    for (int i = 0; i < element->GetNumberOfNestedElements(); ++i)
+        makeNamesUnique(element->GetNestedElement(i), renamed);
+}
+
+/// A reader of VTK's that meets unique names only. VTK keeps arrays by name but counts those in the file, so
+/// of two of one name it loses one, and gives others wrong values or crashes.
+template <class Reader>
+class UniqueNames : public Reader {
+  public:
+    static vtkSmartPointer<UniqueNames> create(std::shared_ptr<RenamedFields> renamed) {
+        auto reader = vtkSmartPointer<UniqueNames>::Take(new UniqueNames);
+        reader->InitializeObjectBase();
+        reader->renamed_ = std::move(renamed);
+        return reader;
+    }
+
+  protected:
+    int ReadVTKFile(vtkXMLDataElement* file) override {
+        makeNamesUnique(file, *renamed_);
+        return Reader::ReadVTKFile(file);
+    }
+
+  private:
+    std::shared_ptr<RenamedFields> renamed_;
+};
+
 struct XmlReaderKind {
     const char* type;         // attribute of <VTKFile>
     const char* description;  // for the user
-    vtkSmartPointer<vtkXMLReader> (*make)();
+    vtkSmartPointer<vtkXMLReader> (*make)(const std::shared_ptr<RenamedFields>& renamed);
 };
 
 template <class Reader>
-vtkSmartPointer<vtkXMLReader> makeXmlReader() {
-    return vtkSmartPointer<Reader>::New();
+vtkSmartPointer<vtkXMLReader> makeXmlReader(const std::shared_ptr<RenamedFields>& renamed) {
+    return UniqueNames<Reader>::create(renamed);
 }
 
 const XmlReaderKind kXmlReaders[] = {
@@ -68,9 +130,10 @@ void selectArrays(vtkDataArraySelection* selection, FieldLocation location, cons
 VtkSource openXml(const std::string& path, const DeclaredSize& info) {
     for (const XmlReaderKind& kind : kXmlReaders) {
         if (info.type != kind.type) continue;
-        auto reader = kind.make();
+        const auto renamed = std::make_shared<RenamedFields>();
+        auto reader = kind.make(renamed);
         reader->SetFileName(path.c_str());
-        return {reader, kind.description};
+        return {reader, kind.description, {}, {}, renamed};
     }
     throw InputError(
         path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
@@ -116,6 +179,24 @@ void throwOnErrors(const std::string& path, const VtkMessages& messages) {
     if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
 }
 
+/// A reader may say the same for every cell.
+void addVtkWarnings(const std::vector<std::string>& all, ImportStatistics& statistics) {
+    std::map<std::string, int> counts;
+    for (const std::string& warning : all) ++counts[warning];
+    for (const auto& [warning, count] : counts)
+        statistics.warnings.push_back("VTK: " + warning +
+                                      (count > 1 ? " (" + std::to_string(count) + " times)" : ""));
+}
+
+/// Nothing of what a file holds changes its name without a word.
+void warnOfRenamed(const RenamedFields& renamed, ImportStatistics& statistics) {
+    if (renamed.names.empty()) return;
+    statistics.warnings.push_back((renamed.names.size() == 1 ? "More than one field is" : "Fields are") +
+                                  std::string(" called ") + nameList(renamed.names) +
+                                  "; those behind the first are called " + nameList(renamed.newNames) +
+                                  " here.");
+}
+
 void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObject* data) {
     if (info.type != "UnstructuredGrid") return;
     const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
@@ -150,10 +231,10 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     if (format == VtkFormat::xml) checkCounts(path, info, data);
     raw.statistics.format = opened.format;
     raw.statistics.warnings = opened.warnings;
+    if (opened.renamed) warnOfRenamed(*opened.renamed, raw.statistics);
     appendVtkData(path, data, opened.nodeIds, options, execution, raw);
     throwOnErrors(path, messages);
-    for (const std::string& warning : messages.warnings())
-        raw.statistics.warnings.push_back("VTK: " + warning);
+    addVtkWarnings(messages.warnings(), raw.statistics);
     if (!raw.blocks.empty())
         raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
     return raw;

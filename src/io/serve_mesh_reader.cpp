@@ -15,6 +15,7 @@
 #include <system_error>
 
 #include "base/error.h"
+#include "base/timer.h"
 #include "io/isolated_reader.h"
 #include "io/mesh_packet.h"
 #include "io/reader_process.h"
@@ -126,6 +127,7 @@ bool memoryTakes(std::int64_t bytes) {
 }
 
 void handOver(MeshFile file, std::int64_t memoryBytes) {
+    file.readPeakBytes = peakMemoryBytes();
     const std::int64_t bytes = packetBytes(file);
     if (bytes > memoryBytes) throw std::bad_alloc();  // the parent would take it for garbage
     if (memoryTakes(bytes)) {

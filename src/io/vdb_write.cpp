@@ -270,7 +270,7 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
     });
     for (std::size_t begin = 0; begin < places.size(); begin += kBatchTiles) {
         const std::size_t end = std::min(places.size(), begin + kBatchTiles);
-        execution.report("write", std::int64_t(begin), std::int64_t(places.size()));
+        execution.report(Stage::writing, std::int64_t(begin), std::int64_t(places.size()));
         std::vector<GridTile> batch;
         for (std::size_t i = begin; i < end; ++i) batch.push_back(places[i].grid);
         addTiles(grids, batch, execution);

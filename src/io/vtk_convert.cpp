@@ -181,7 +181,7 @@ void copyFields(const std::string& path, vtkDataSetAttributes* attributes, Field
         if (name.empty())
             name =
                 (location == FieldLocation::point ? "point_field_" : "cell_field_") + std::to_string(a + 1);
-        if (!seen.insert(name).second) continue;
+        if (!seen.insert(name).second) continue;  // VTK's attributes hold one array of a name
         auto* array = vtkDataArray::SafeDownCast(abstract);
         block.arrays.push_back({name, location, abstract->GetNumberOfComponents(), array != nullptr});
         if (abstract->GetNumberOfTuples() != items)

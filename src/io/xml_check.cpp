@@ -73,8 +73,9 @@ class XmlCheck {
         XmlPacking packing;
         std::optional<double> unpackedBound;  ///< the most bytes that the file can hold, unpacked
         DeclaredSize size;
-        std::size_t markupEnd = 0;  ///< where appended data begin, or the file's end
-        std::string section;        ///< "PointData", "Cells", ...
+        std::size_t markupEnd = 0;    ///< where appended data begin, or the file's end
+        std::string section;          ///< "PointData", "Cells", ...
+        std::set<std::string> names;  ///< of the section's arrays so far
         double piecePoints = 0, pieceCells = 0;
         double wholePoints = -1;
         double pointsOfPieces = 0;
@@ -86,6 +87,7 @@ class XmlCheck {
     void checkGrid(File& file, const XmlTag& tag) const;
     void checkPiece(File& file, const XmlTag& tag) const;
     void checkArray(File& file, const XmlTag& tag) const;
+    void checkName(File& file, const XmlTag& tag) const;
     void checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute);
     void checkSums(const File& file) const;
     std::int64_t count(const File& file, const XmlTag& tag, std::string_view name) const;
@@ -202,6 +204,18 @@ void XmlCheck::checkArray(File& file, const XmlTag& tag) const {
     addCount(file.size.gridPoints, std::int64_t(file.piecePoints));
 }
 
+/// Where files are made of others, VTK itself opens these, and doesn't bear two arrays of one name.
+void XmlCheck::checkName(File& file, const XmlTag& tag) const {
+    const bool isAlone = file.depth == 0 && !file.size.type.starts_with('P');
+    const bool isField = file.section.ends_with("PointData") || file.section.ends_with("CellData");
+    if (isAlone || !isField) return;
+    const auto name = attributeOf(tag.text, "Name");
+    if (name && !file.names.insert(std::string(*name)).second)
+        throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": " + file.section +
+                         " has a second array named " + quoted(*name) +
+                         "; the parts of a parallel or multi-block file need names of their own");
+}
+
 void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute) {
     const auto name = attributeOf(tag.text, attribute);
     if (!name || name->empty()) return;
@@ -228,9 +242,13 @@ void XmlCheck::checkTag(File& file, const XmlTag& tag) {
     } else if (tag.name() == "DataSet" && file.size.type.starts_with("vtk")) {
         checkNamedFile(file, tag, "file");
     } else if (tag.name() == "DataArray" || tag.name() == "Array") {
+        checkName(file, tag);
         checkArray(file, tag);
+    } else if (tag.name() == "PDataArray") {
+        checkName(file, tag);
     } else {
         file.section = tag.name();
+        file.names.clear();
     }
 }
 
@@ -256,7 +274,7 @@ void XmlCheck::checkSums(const File& file) const {
 DeclaredSize XmlCheck::run(const std::string& path, int depth) {
     if (depth > kDeepest) throw InputError(path + ": files name each other more than 8 deep");
     InputFile input(path);
-    File file{input, path, depth, {}, {}, {}, 0, {}, 0, 0, -1, 0, false};
+    File file{input, path, depth, {}, {}, {}, 0, {}, {}, 0, 0, -1, 0, false};
     file.size.fileBytes = std::int64_t(input.size());
     const std::size_t inside = checkFrame(file);
     XmlTags tags(input, inside, file.markupEnd);

@@ -141,7 +141,7 @@ bool Repairer::passOver(std::vector<std::int32_t>& pending, std::size_t lastStep
         const std::int32_t e = pending[std::size_t(i)];
         if (i % 64 == 0) {
             execution_.throwIfCancelled();
-            execution_.report("repair", i, total);
+            execution_.report(Stage::repairing, i, total);
         }
         if (!complex_.isAlive(e)) continue;
         for (std::size_t step = 0; step <= lastStep; ++step) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -11,6 +12,7 @@ namespace tessera {
 
 /// Linear 3D cells. Nodes are in the order of VTK's cell of the same name (a voxel's in that of vtkVoxel).
 enum class CellKind : std::uint8_t { tet, pyramid, wedge, hex, voxel, polyhedron };
+inline constexpr std::size_t kCellKinds = 6;
 
 /// Number of nodes of a kind, 0 for a polyhedron.
 int nodeCountOf(CellKind kind);

@@ -162,7 +162,7 @@ ResampleStatistics BoundSlab::Run::all() {
             // The device draws one region while the processor prepares the next.
             start(r);
             if (jobs_.size() > 1) finishOldest();
-            execution_.report("resample", std::int64_t(r) + 1, std::int64_t(regions_.size()));
+            execution_.report(Stage::sampling, std::int64_t(r) + 1, std::int64_t(regions_.size()));
         }
         while (!jobs_.empty()) finishOldest();
     } catch (...) {

@@ -146,7 +146,7 @@ class BoundSoftware : public BoundResampler {
                 std::lock_guard lock(mutex);
                 idle.push_back(std::move(works[box]));
             }
-            execution.report("resample", ++done, std::int64_t(regions.size()));
+            execution.report(Stage::sampling, ++done, std::int64_t(regions.size()));
         });
         // A box without points still gets its call.
         for (std::size_t b = 0; b < boxes.size(); ++b) {

@@ -98,7 +98,7 @@ class VoxelChecker {
             std::vector<float> thinnest;
             checker.check(std::span(&block, 1), std::span(&stored_.bounds, 1),
                           std::span(&checks[std::size_t(i)], 1), thinnest, one, rules);
-            execution_.report("samples", ++done, std::int64_t(leaves.size()));
+            execution_.report(Stage::comparing, ++done, std::int64_t(leaves.size()));
         });
         for (PointCheck& check : checks) {
             if (!check.firstProblem.empty())

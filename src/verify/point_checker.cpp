@@ -13,10 +13,10 @@ namespace tessera {
 namespace {
 
 constexpr int kTileEdge = 16;
-constexpr double kSlackVoxels = 1e-9;  // far above the rounding of distances, far below every bound
-constexpr float kUndecided = 1.0f;     // as a share of what is allowed
-constexpr double kHalfUlp = 0x1p-11;        // half a unit in the last place of half floats
-constexpr double kSmallestHalf = 0x1p-25;   // the same of the smallest ones
+constexpr double kSlackVoxels = 1e-9;      // far above the rounding of distances, far below every bound
+constexpr float kUndecided = 1.0f;         // as a share of what is allowed
+constexpr double kHalfUlp = 0x1p-11;       // half a unit in the last place of half floats
+constexpr double kSmallestHalf = 0x1p-25;  // the same of the smallest ones
 constexpr float kNone = std::numeric_limits<float>::infinity();
 
 /// One field component over one element: a linear function of the weights.

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/execution.h"
-#include "verify/voxel_mesh.h"
 #include "lattice/block.h"
 #include "resample/resampler.h"
+#include "verify/voxel_mesh.h"
 
 namespace tessera {
 
