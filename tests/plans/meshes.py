@@ -138,14 +138,18 @@ def field_values(rng, kind, unit):
     a = rng.normal(size=3)
     if kind == "linear":
         return unit @ a
+    if kind == "bump":
+        # Varies in a small part of the mesh only, so that plans by error have several levels.
+        middle = unit[rng.integers(len(unit))]
+        return unit @ a * 0.05 + numpy.exp(-(((unit - middle) ** 2).sum(axis=1)) / rng.uniform(0.05, 0.25) ** 2)
     w, phase = rng.normal(size=(3, 3)) * rng.uniform(0.5, 4), rng.uniform(0, 6.28, 3)
     return numpy.sin(unit @ w.T + phase).sum(axis=1) + unit @ a
 
 
 def make_fields(rng, unit, centroids, features):
     fields = []
-    kind = str(rng.choice(["linear", "smooth", "offset"]))
-    values = field_values(rng, "linear" if kind == "linear" else "smooth", unit)[:, None]
+    kind = str(rng.choice(["linear", "smooth", "offset", "bump"], p=[0.2, 0.2, 0.3, 0.3]))
+    values = field_values(rng, "smooth" if kind == "offset" else kind, unit)[:, None]
     if kind == "offset":
         values = 300 + values * rng.choice([1.0, 0.1])
     elif rng.random() < 0.3:
@@ -186,6 +190,9 @@ def make_mesh(rng):
     if rng.random() < 0.15:
         points = points * numpy.where(numpy.arange(3) == rng.integers(3), 0.03, 1.0)
         features.add("squeezed")
+    elif rng.random() < 0.5:
+        points = points * numpy.where(numpy.arange(3) == rng.integers(3), 1.0, rng.uniform(0.1, 0.6, 3))
+        features.add("elongated")
     longest = (points.max(axis=0) - points.min(axis=0)).max()
     unit = (points - points.min(axis=0)) / longest
     # Elements so thin that their orientation isn't sure in double have no part in a test that computes in double.

@@ -54,14 +54,16 @@ def draw_options(rng, mesh, algorithms):
         else:
             use("--resolution", resolution)
     elif refine == "element-size":
-        use("--samples-per-element", round(float(rng.uniform(0.7, 2.5)), 2), "--max-levels", rng.integers(1, 6))
+        use("--samples-per-element", round(float(rng.uniform(0.7, 3.5)), 2), "--max-levels", choose(rng, [(1, 1), (3, 2), (3, 3), (2, 5)]))
     else:
-        use("--max-error", f"{round(float(rng.uniform(2, 20)), 1)}%", "--error-measure", choose(rng, [(2, "max"), (1, "rms")]))
+        use("--max-error", f"{float(10 ** rng.uniform(-0.5, 1.3)):.2g}%", "--error-measure", choose(rng, [(2, "max"), (1, "rms")]))
         if rng.random() < 0.5:
-            use("--max-levels", rng.integers(1, 6))
+            use("--max-levels", rng.integers(2, 6))
         if all(field.location == "cell" for field in mesh.fields):
             use("--error-field", mesh.fields[0].name)
     if refine != "uniform" and rng.random() < 0.25:
+        # Two levels begin at 63 points for bricks of 8 cells, at 127 for others.
+        spacing = longest / (rng.uniform(64, 160) * brick_size / 8)
         use("--spacing", repr(spacing))
         features.add("adaptive with finest spacing")
     layout = choose(rng, [(1, "levels"), (1, "flat")])
@@ -75,9 +77,11 @@ def draw_options(rng, mesh, algorithms):
         kind, a, b = draw_bounds(rng, mesh, spacing)
         use("--bounds=" + ",".join(repr(float(x)) for x in (*a, *b)))
         features.add(f"bounds {kind}")
-    if refine != "uniform" or rng.random() < 0.2:
+    if refine != "uniform":
         # Small enough that error refinement ends early and flat grids are capped now and then.
-        use("--max-voxels", int(10.0 ** rng.uniform(4.3, 5.3)))
+        use("--max-voxels", int(10.0 ** rng.uniform(4.8, 5.5)) * (2 if brick_size == 16 else 1))
+    elif rng.random() < 0.2:
+        use("--max-voxels", int(10.0 ** rng.uniform(4.5, 5.3)))
     if rng.random() < 0.25:
         use("--half")
         features.add("half")
