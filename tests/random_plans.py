@@ -80,7 +80,7 @@ def check_file(outcome, rng, program, mesh, mesh_path, vdb_path, arguments):
         outcome.problems.append(f"metadata: tessera_extend is {file.metadata.get('tessera_extend')}, expected {extend}")
         file.extend = extend
     samples = MeshSamples(mesh, file.tree, PLACE[algorithm])
-    findings = Checker(mesh, samples, file, algorithm, "--half" in arguments).run()
+    findings = Checker(mesh, samples, file, algorithm).run(rng)
     outcome.problems += findings.problems
     outcome.ratios, outcome.counts = findings.ratios, findings.counts
     outcome.features |= file_features(file)
@@ -88,11 +88,10 @@ def check_file(outcome, rng, program, mesh, mesh_path, vdb_path, arguments):
 
 
 def file_features(file):
-    features = {f"{len(file.levels())} levels" if file.layout == "levels" else "flat file"}
-    if file.layout == "flat" and file.flat_level > 0:
+    levels = sum(1 for bricks in file.tree.bricks if len(bricks))
+    features = {f"{file.layout} of {levels} levels"}
+    if file.flat_level > 0:
         features.add("flat capped")
-    if sum(1 for bricks in file.tree.bricks if len(bricks)) > 1:
-        features.add("several levels")
     return features
 
 

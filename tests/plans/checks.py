@@ -1,41 +1,22 @@
-"""Checks of one file against its mesh. Each appends sentences to a list of problems and ratios of error to allowance to a summary."""
+"""Checks of the voxels of one file against its mesh: coverage, values, what is active and what isn't."""
 
 import numpy
 
-from plans.geometry import IN, OUT, Values, float_ulp
-from plans.oracle import CORNERS, ON_PLANE, Reconstruction, keys_of, weights_of
-from plans.vdb_reader import FileSamples, turn
+from plans.findings import Findings, some
+from plans.geometry import IN, OUT, float_ulp
+from plans.oracle import Reconstruction, keys_of
+from plans.places import PlaceChecker
+from plans.vdb_reader import turn
 
 SPILL = {"software": 2.0**-12, "slicing": 2.0**-8, "hybrid": 2.0**-8}
 PLACE = {"software": 2.0**-24, "slicing": 2.0**-8, "hybrid": 2.0**-8}
 
 
-class Findings:
-    def __init__(self):
-        self.problems = []
-        self.ratios = {}
-        self.counts = {}
-
-    def problem(self, check, text):
-        self.problems.append(f"{check}: {text}")
-
-    def ratio(self, check, value):
-        self.ratios[check] = max(self.ratios.get(check, 0.0), float(value))
-
-    def count(self, what, number):
-        self.counts[what] = self.counts.get(what, 0) + int(number)
-
-
-def some(points, most=3):
-    text = ", ".join(str(tuple(int(x) for x in p)) for p in points[:most])
-    return text + (f" and {len(points) - most} more" if len(points) > most else "")
-
-
 class Kept:
     """The lattice points that --bounds keeps."""
 
-    def __init__(self, file, layout_level):
-        self.file, self.layout_level = file, layout_level
+    def __init__(self, file):
+        self.file = file
         tree = file.tree
         self.boxes = {}
         if file.bounds:
@@ -61,7 +42,7 @@ class Kept:
         return result
 
 
-def stored_points(file, level, kept):
+def stored_points(mesh, file, level, kept):
     """Lattice points that the leaves own: those of one level, or all of the flat grid's level."""
     tree = file.tree
     n = tree.cells
@@ -69,6 +50,12 @@ def stored_points(file, level, kept):
     if file.layout == "levels":
         points = (tree.bricks[level][:, None, :] * n + cube).reshape(-1, 3)
         return points[kept.keeps(level, points)]
+    if not file.bounds:
+        # All of the mesh is stored, so its whole box is looked at.
+        low, high = (numpy.floor((x - tree.origin) / tree.level_spacing(level)).astype(numpy.int64) for x in mesh.bounds())
+        if float((high - low + 2.0).prod()) < 4e6:
+            axes = [numpy.arange(a, b + 2) for a, b in zip(low, high)]
+            return numpy.stack(numpy.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     parts = []
     for m in range(tree.levels):
         if m >= level:
@@ -80,7 +67,6 @@ def stored_points(file, level, kept):
         else:
             step = 1 << (level - m)
             for brick in tree.bricks[m]:
-                low = -(-brick * n // step)
                 low, high = -((-brick * n) // step), -((-(brick + 1) * n) // step)
                 axes = [numpy.arange(a, b) for a, b in zip(low, high)]
                 points = numpy.stack(numpy.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -89,19 +75,19 @@ def stored_points(file, level, kept):
 
 
 class Checker:
-    def __init__(self, mesh, mesh_samples, file, algorithm, half):
-        self.mesh, self.samples, self.file, self.algorithm, self.half = mesh, mesh_samples, file, algorithm, half
+    def __init__(self, mesh, mesh_samples, file, algorithm):
+        self.mesh, self.samples, self.file, self.algorithm = mesh, mesh_samples, file, algorithm
         self.findings = Findings()
-        self.kept = Kept(file, file.flat_level)
+        self.kept = Kept(file)
         self.oracle = Reconstruction(file.tree, mesh_samples)
-        self.states = {}  # level -> (sorted keys, state) of the stored points
 
-    def run(self):
+    def run(self, rng):
         self.structure()
         for level in self.file.levels():
             self.coverage(level)
             self.values(level)
-        self.places()
+        self.report()
+        PlaceChecker(self.mesh, self.samples, self.file, self.oracle, self.kept, self.findings).run(rng)
         return self.findings
 
     def structure(self):
@@ -120,7 +106,7 @@ class Checker:
         file = self.file
         tree, corner = file.tree, grid.points if len(grid.points) else numpy.zeros((1, 3), numpy.int64)
         for index in (corner.min(axis=0), corner.max(axis=0)):
-            wanted = file.unit_scale * turn(tree.origin + tree.level_spacing(grid.level) * index, file.up_axis)
+            wanted = file.unit_scale * turn(tree.origin + tree.level_spacing(grid.level) * (index + file.voxel_shift), file.up_axis)
             got = numpy.array(grid.vdb.transform.indexToWorld(tuple(int(i) for i in index)))
             size = numpy.abs(wanted).max() + numpy.abs(file.unit_scale * tree.origin).max()
             allowed = 2.0**-50 * size * (1 + numpy.abs(index).max()) + 1e-12 * file.unit_scale * tree.level_spacing(grid.level)
@@ -133,10 +119,8 @@ class Checker:
         out, grid = self.findings, self.file.grid("coverage", level)
         if grid is None:
             return
-        points = stored_points(self.file, level, self.kept)
-        state, values = self.samples.states(level, points)
-        order = numpy.argsort(keys_of(points))
-        self.states[level] = (keys_of(points)[order], state[order])
+        points = stored_points(self.mesh, self.file, level, self.kept)
+        state = self.samples.states(level, points)
         covered = grid.find(points) >= 0
         out.count("stored points", len(points))
         out.count("covered points", covered.sum())
@@ -152,7 +136,7 @@ class Checker:
         if len(stray) and self.file.layout == "levels":
             out.problem("bricks", f"coverage level {level} is active in no brick of the level at {some(stray)}")
         elif len(stray):
-            spilt = numpy.concatenate([spilt, stray[self.samples.states(level, stray)[0] == OUT]])
+            spilt = numpy.concatenate([spilt, stray[self.samples.states(level, stray) == OUT]])
         if len(spilt):
             distance, _ = self.samples.level(level).nearest(spilt)
             bound = SPILL[self.algorithm]
@@ -160,6 +144,26 @@ class Checker:
             if (distance > bound + 1e-9).any():
                 far = distance > bound + 1e-9
                 out.problem("spill", f"coverage level {level}: active {distance.max():g} voxel from the mesh: {some(spilt[far])}")
+
+    def report(self):
+        """Counts in the report are those of the grids."""
+        file = self.file
+        if file.layout != "levels":
+            return
+        covered = {level: file.grid("coverage", level) for level in file.levels()}
+        if any(grid is None for grid in covered.values()):
+            return
+        count = sum(len(grid.points) for grid in covered.values())
+        if count != file.report["covered_points"]:
+            self.findings.problem("counts", f"covered_points is {file.report['covered_points']}, the coverage has {count}")
+        for field, claim in zip(file.fields, file.report["fields"]):
+            valid = 0
+            for level in file.levels():
+                grids = [file.grid(name, level) for name in field["grids"]]
+                points = covered[level].points
+                valid += numpy.all([grid.find(points) >= 0 for grid in grids if grid is not None], axis=0).sum()
+            if valid != claim["valid_points"]:
+                self.findings.problem("counts", f"valid_points of {field['name']} is {claim['valid_points']}, its grids have {valid}")
 
     def values(self, level):
         """Every active voxel holds R(p), or the value at the nearest mesh point; the right ones are active."""
@@ -212,7 +216,7 @@ class Checker:
             self.findings.problem("extension", f"level {level} has extension voxels without --extend: {some(extension)}")
             return
         distance, _ = self.samples.level(level).nearest(extension)
-        states, _ = self.samples.states(level, extension)
+        states = self.samples.states(level, extension)
         bound = 3**0.5 * max(self.file.extend, 1) * (1 + 1e-6)
         if self.file.layout == "levels":
             bound *= 2  # coarse corners of a border cell, and corners in finer grids
@@ -239,112 +243,3 @@ class Checker:
                 i = numpy.flatnonzero(bad)[numpy.argmax(numpy.abs(got - middle)[bad])]
                 out.problem("values", f"{grid.name} component {component}: {bad.sum()} {name}s of {rows.sum()} are wrong, worst at {some(points[i:i + 1])}: "
                             f"expected {low[i]!r} to {high[i]!r}, got {got[i]!r}")  # fmt: skip
-
-    # Places in the mesh -------------------------------------------------------------------------------------------------------------
-
-    def places(self):
-        """Nodes and centroids: a trilinear reader finds all its voxels, and the file's figures hold and aren't inflated."""
-        mesh, file = self.mesh, self.file
-        nodes = numpy.unique(mesh.tets)
-        points = numpy.concatenate([mesh.points[nodes], mesh.points[mesh.tets].mean(axis=1)])
-        is_node = numpy.arange(len(points)) < len(nodes)
-        sure = numpy.ones(len(points), bool)
-        if file.bounds:
-            b = numpy.array(file.bounds).reshape(2, 3)
-            slack = numpy.minimum(points - b[0], b[1] - points).min(axis=1) / file.tree.spacing
-            points, is_node, sure, nodes_kept = points[slack >= -1e-9], is_node[slack >= -1e-9], slack[slack >= -1e-9] > 1e-9, slack >= -1e-9
-        else:
-            nodes_kept = sure
-        if not len(points):
-            return
-        reader = FileSamples(file, self.samples)
-        got = self.read_flat(reader, points) if file.layout == "flat" else self.read_levels(reader, points, sure)
-        if file.extend:
-            missing = {}
-            for name, where in reader.missing:
-                missing.setdefault(name, []).append(where)
-            for name, where in missing.items():
-                where = numpy.unique(numpy.concatenate(where), axis=0)
-                self.findings.problem("missing voxels", f"{name}: places in the mesh need {len(where)} voxels that aren't active: {some(where)}")
-        self.figures(got, points, is_node, sure, nodes, nodes_kept)
-
-    def snap(self, fraction):
-        return numpy.where(fraction < ON_PLANE, 0.0, numpy.where(fraction > 1 - ON_PLANE, 1.0, fraction))
-
-    def read_flat(self, reader, places):
-        file, level = self.file, self.file.flat_level
-        index = (places - file.tree.origin) / file.tree.level_spacing(level)
-        cell = numpy.floor(index).astype(numpy.int64)
-        self.findings.count("places read", len(places))
-
-        class OneGrid:
-            table, channels, fields = reader.table, reader.channels, reader.fields
-
-            @staticmethod
-            def sample(_, points):
-                return reader.read(level, points, lambda rows: self.oracle.at(level, points[rows]))
-
-        flat = FlatReconstruction(OneGrid)
-        return flat.interpolate(level, cell, self.snap(index - cell))
-
-    def read_levels(self, reader, places, sure):
-        file = self.file
-        level, first = file.tree.leaf_of_places(places)
-        lost = (level < 0) & sure
-        if lost.any():
-            self.findings.problem("bricks", f"{lost.sum()} places in the mesh are in no brick, the first {places[lost][0]}")
-        recon = Reconstruction(file.tree, reader)
-        result = Values.none(len(places), reader.channels, reader.fields)
-        result.broken[level < 0] = True
-        self.findings.count("places read", (level >= 0).sum())
-        for m in numpy.unique(level[level >= 0]):
-            rows = numpy.flatnonzero(level == m)
-            index = (places[rows] - file.tree.origin) / file.tree.level_spacing(int(m)) - first[rows]
-            cell = numpy.clip(numpy.floor(index), 0, file.tree.cells - 1).astype(numpy.int64)
-            fraction = numpy.clip(self.snap(index - cell), 0, 1)
-            result.put(rows, recon.interpolate(int(m), cell + first[rows], fraction))
-        return result
-
-    def figures(self, got, places, is_node, sure, nodes, kept):
-        """The largest deviation is the file's figure: not above it, and not below."""
-        mesh, out, table = self.mesh, self.findings, self.samples.table
-        for position, (field, claim) in enumerate(zip(mesh.fields, self.file.report["fields"])):
-            channels = slice(table.first[position], table.first[position + 1])
-            if field.location == "point":
-                exact = numpy.concatenate([field.values[nodes], field.values[mesh.tets].mean(axis=1)])[kept]
-                with numpy.errstate(over="ignore"):
-                    finite = numpy.isfinite(exact.astype(numpy.float32)).all(axis=1)
-                finite[~is_node] &= ~table.broken[kept[len(nodes) :], position]
-            else:
-                exact = numpy.concatenate([numpy.zeros((len(nodes), field.components)), field.values])[kept]
-                with numpy.errstate(over="ignore"):
-                    finite = numpy.isfinite(exact.astype(numpy.float32)).all(axis=1) & ~is_node
-            usable = finite & got.finite[:, position]
-            certain = usable & sure & ~got.broken[:, position]
-            if not usable.any():
-                continue
-            low, high = got.low[:, channels], got.high[:, channels]
-            most = numpy.linalg.norm(numpy.maximum(numpy.abs(low - exact), numpy.abs(high - exact))[usable], axis=1).max()
-            scale = numpy.abs(exact[usable]).max()
-            allowed = 4 * float_ulp(scale) + 1e-6 * abs(claim["max"] or 0)
-            if certain.any():
-                error = numpy.linalg.norm(numpy.maximum(0, numpy.maximum(low - exact, exact - high))[certain], axis=1)
-                worst = numpy.argmax(error)
-                out.ratio("error above the figure", max(0, error[worst] - claim["max"]) / allowed)
-                if error[worst] > claim["max"] + allowed:
-                    out.problem("figure", f"{field.name}: the file says {claim['max']!r}, a trilinear reader is off by {error[worst]!r} at "
-                                f"{places[certain][worst].tolist()} (exact {exact[certain][worst].tolist()}, "
-                                f"read {low[certain][worst].tolist()})")  # fmt: skip
-            out.ratio("figure above the error", max(0, claim["max"] - most) / allowed)
-            if claim["max"] > most + allowed:
-                out.problem("figure", f"{field.name}: the file says {claim['max']!r} at {claim.get('worst_place')}, but the largest error found is {most!r}")
-
-
-class FlatReconstruction(Reconstruction):
-    """A trilinear reader of one grid."""
-
-    def __init__(self, samples):
-        super().__init__(None, samples)
-
-    def at_unique(self, level, points):
-        return self.samples.sample(level, points)

@@ -24,21 +24,21 @@ def float_ulp(values):
 
 @dataclasses.dataclass
 class Values:
-    """Intervals of the channels at some points; per field, whether the value may be finite and may not be."""
+    """Intervals of the channels at some points; for each value grid, whether the value may be finite and may not be."""
 
     low: numpy.ndarray  # (points, channels)
     high: numpy.ndarray
-    finite: numpy.ndarray  # (points, fields) bool
+    finite: numpy.ndarray  # (points, grids) bool
     broken: numpy.ndarray
 
     @staticmethod
-    def none(count, channels, fields):
+    def none(count, channels, grids):
         return Values(
             numpy.full((count, channels), numpy.inf), numpy.full((count, channels), -numpy.inf),
-            numpy.zeros((count, fields), bool), numpy.zeros((count, fields), bool),
+            numpy.zeros((count, grids), bool), numpy.zeros((count, grids), bool),
         )  # fmt: skip
 
-    def add(self, at, low, high, broken, channel_field):
+    def add(self, at, low, high, broken, channel_grid):
         """Joins candidates (several for a point) into the points' intervals."""
         if len(at) == 0:
             return
@@ -47,7 +47,7 @@ class Values:
         starts = numpy.flatnonzero(numpy.r_[True, at[1:] != at[:-1]])
         points = at[starts]
         broken = broken[order]
-        out = broken[:, channel_field]
+        out = broken[:, channel_grid]
         low = numpy.minimum.reduceat(numpy.where(out, numpy.inf, low[order]), starts)
         high = numpy.maximum.reduceat(numpy.where(out, -numpy.inf, high[order]), starts)
         self.low[points] = numpy.minimum(self.low[points], low)
@@ -63,12 +63,17 @@ class Values:
 
 
 class FieldTable:
-    """All fields of a mesh as channels of elements."""
+    """All fields of a mesh as channels of elements. A value grid holds three channels of a vector, or one."""
 
     def __init__(self, mesh):
         self.fields = mesh.fields
         self.channels = sum(f.components for f in mesh.fields)
-        self.channel_field = numpy.concatenate([numpy.full(f.components, i) for i, f in enumerate(mesh.fields)])
+        grids = [1 if f.components == 3 else f.components for f in mesh.fields]
+        self.grids = sum(grids)
+        self.field_grids = [slice(sum(grids[:i]), sum(grids[: i + 1])) for i in range(len(grids))]
+        self.channel_grid = numpy.concatenate(
+            [numpy.arange(f.components) * (f.components != 3) + g.start for f, g in zip(mesh.fields, self.field_grids)]
+        )
         self.first = numpy.cumsum([0] + [f.components for f in mesh.fields])
         corner = [
             f.values[mesh.tets] if f.location == "point" else numpy.repeat(f.values[:, None, :], 4, axis=1) for f in mesh.fields
@@ -77,8 +82,8 @@ class FieldTable:
         with numpy.errstate(over="ignore"):
             finite = numpy.isfinite(corner.astype(numpy.float32))
         self.broken_corner = numpy.stack(
-            [~finite[:, :, a:b].all(axis=2) for a, b in zip(self.first, self.first[1:])], axis=2
-        )  # (elements, 4, fields)
+            [~finite[:, :, self.channel_grid == g].all(axis=2) for g in range(self.grids)], axis=2
+        )  # (elements, 4, grids)
         self.broken = self.broken_corner.any(axis=1)
         self.corner = numpy.where(finite, corner, 0.0)
         f32 = self.corner.astype(numpy.float32).astype(float)
@@ -204,13 +209,13 @@ class LatticeMesh:
         self.face_row = (mesh.tets[self.face_owner][:, FACES] == self.faces[:, None, :]).all(axis=2).argmax(axis=1)
         self.triangles = self.nodes[self.faces]
 
-    def element_candidates(self, points, index):
+    def element_candidates(self, points):
         """Yields (element, point, barycentric coordinates, slack) of all pairs within the place bound of the planes.
 
         Slack: the smallest distance to a face plane, in voxels, beyond what rounding may have done; negative outside.
         """
         margin = self.place_bound + SURE
-        for e, p in index.pairs(self.corners.min(axis=1) - margin, self.corners.max(axis=1) + margin):
+        for e, p in PointIndex(points).pairs(self.corners.min(axis=1) - margin, self.corners.max(axis=1) + margin):
             d = points[p] - self.corners[e, 0]
             b = numpy.empty((len(e), 4))
             for i in (1, 2, 3):
@@ -221,36 +226,51 @@ class LatticeMesh:
             near = slack >= -(self.place_bound + SURE + self.bary_error[e] / self.steepness[e].min(axis=1))
             yield e[near], p[near], b[near], slack[near]
 
+    def states(self, points):
+        """IN, MAYBE or OUT for lattice points."""
+        points = numpy.asarray(points, numpy.int64)
+        state = numpy.full(len(points), OUT)
+        for e, p, _, slack in self.element_candidates(points):
+            self.mark(state, e, p, slack)
+        self.settle(points, state)
+        return state
+
+    def mark(self, state, e, p, slack):
+        error = self.bary_error[e] / self.steepness[e].min(axis=1)
+        maybe = p[slack >= -(SURE + error)]
+        state[maybe] = numpy.maximum(state[maybe], MAYBE)
+        state[p[slack >= SURE + error]] = IN
+
+    def settle(self, points, state):
+        """On a face between elements no element alone is sure; what isn't near the boundary faces is inside."""
+        unsure = numpy.flatnonzero(state == MAYBE)
+        distance, _ = self.nearest(points[unsure])
+        state[unsure[distance > 4 * SURE]] = IN
+
     def samples(self, points):
-        """State (IN, MAYBE, OUT) and values at lattice points, which are those of the nearest mesh point outside."""
+        """States and values at lattice points, which outside are those of the nearest mesh point."""
         points = numpy.asarray(points, numpy.int64)
         table, count = self.table, len(points)
         state = numpy.full(count, OUT)
-        values = Values.none(count, table.channels, len(table.fields))
-        index = PointIndex(points)
-        for e, p, b, slack in self.element_candidates(points, index):
+        values = Values.none(count, table.channels, table.grids)
+        for e, p, b, slack in self.element_candidates(points):
+            self.mark(state, e, p, slack)
             error = self.bary_error[e] / self.steepness[e].min(axis=1)
-            numpy.maximum.at(state, p[slack >= -(SURE + error)], MAYBE)
-            state[p[slack >= SURE + error]] = IN
             f = numpy.einsum("pi,pic->pc", b[:, 1:], table.corner[e, 1:] - table.corner[e, :1]) + table.corner[e, 0]
             allowed = table.rounding[e] + self.gradient[e] * (self.place_bound + error[:, None]) + 1e-14 * numpy.abs(table.corner[e]).max(axis=1)
             low = numpy.clip(f - allowed, table.lowest[e], table.highest[e])
             high = numpy.clip(f + allowed, table.lowest[e], table.highest[e])
-            values.add(p, low, high, table.broken[e], table.channel_field)
+            values.add(p, low, high, table.broken[e], table.channel_grid)
+        self.settle(points, state)
         unsure = numpy.flatnonzero(state < IN)
-        distance, nearest = self.nearest(points[unsure])
-        # On a face between elements no element alone is sure; what isn't near the boundary faces is inside.
-        inside = (state[unsure] == MAYBE) & (distance > 4 * SURE)
-        state[unsure[inside]] = IN
-        edge = unsure[(state[unsure] == MAYBE)]
-        keep = values.take(edge)
-        values.put(unsure[~inside], nearest.take(~inside))
-        if len(edge):
-            joined = values.take(edge)
-            joined.low, joined.high = numpy.minimum(joined.low, keep.low), numpy.maximum(joined.high, keep.high)
-            joined.finite |= keep.finite
-            joined.broken |= keep.broken
-            values.put(edge, joined)
+        _, nearest = self.nearest(points[unsure])
+        on_edge = state[unsure] == MAYBE
+        keep = values.take(unsure)
+        nearest.low = numpy.where(on_edge[:, None], numpy.minimum(nearest.low, keep.low), nearest.low)
+        nearest.high = numpy.where(on_edge[:, None], numpy.maximum(nearest.high, keep.high), nearest.high)
+        nearest.finite |= on_edge[:, None] & keep.finite
+        nearest.broken |= on_edge[:, None] & keep.broken
+        values.put(unsure, nearest)
         return state, values
 
     def face_pairs(self, points, reach):
@@ -264,7 +284,7 @@ class LatticeMesh:
         points = numpy.asarray(points, numpy.int64)
         count = len(points)
         distance = numpy.full(count, numpy.inf)
-        values = Values.none(count, self.table.channels, len(self.table.fields))
+        values = Values.none(count, self.table.channels, self.table.grids)
         todo = numpy.arange(count)
         reach = 1.75
         while len(todo) and reach < 1e7:
@@ -298,7 +318,7 @@ class LatticeMesh:
         low, high = low - float_ulp(low), high + float_ulp(high)
         at_place = (table.broken_corner[owner[:, None], local] & (w > 0)[:, :, None]).any(axis=1)
         # An element with a value that isn't finite has none; its face without that node may be said to have one.
-        values.add(rows[p], low, high, at_place, table.channel_field)
+        values.add(rows[p], low, high, at_place, table.channel_grid)
         other = numpy.flatnonzero((table.broken[owner] & ~at_place).any(axis=1))
         if len(other):
-            values.add(rows[p[other]], low[other], high[other], table.broken[owner[other]], table.channel_field)
+            values.add(rows[p[other]], low[other], high[other], table.broken[owner[other]], table.channel_grid)

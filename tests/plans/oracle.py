@@ -82,7 +82,7 @@ class MeshSamples:
     def __init__(self, mesh, tree, place_bound):
         self.mesh, self.tree, self.place_bound = mesh, tree, place_bound
         self.table = FieldTable(mesh)
-        self.channels, self.fields = self.table.channels, len(mesh.fields)
+        self.channels, self.grids = self.table.channels, self.table.grids
         self.levels = {}
 
     def level(self, level):
@@ -91,7 +91,7 @@ class MeshSamples:
         return self.levels[level]
 
     def states(self, level, points):
-        return self.level(level).samples(points)
+        return self.level(level).states(points)
 
     def sample(self, level, points):
         return self.level(level).samples(points)[1]
@@ -110,7 +110,7 @@ class Reconstruction:
         return self.at_unique(level, points[first]).take(back)
 
     def at_unique(self, level, points):
-        result = Values.none(len(points), self.samples.channels, self.samples.fields)
+        result = Values.none(len(points), self.samples.channels, self.samples.grids)
         coarsest = self.tree.coarsest(level, points)
         coarsest[coarsest < 0] = level
         for m in numpy.unique(coarsest):
@@ -133,17 +133,17 @@ class Reconstruction:
         corner, at = numpy.nonzero(weights.T)
         points = cells[at] + CORNERS[corner]
         values = self.at(level, points)
-        return blend(values, at, weights[at, corner], len(cells), numpy.asarray(self.samples.table.channel_field))
+        return blend(values, at, weights[at, corner], len(cells), self.samples.table.channel_grid)
 
 
-def blend(values, at, weights, count, channel_field):
+def blend(values, at, weights, count, channel_grid):
     """Weighted sums of intervals; finite when all parts are."""
     order = numpy.argsort(at, kind="stable")
     starts = numpy.flatnonzero(numpy.r_[True, numpy.diff(at[order]) > 0])
     w = weights[order, None]
     ok = values.finite[order]
-    low = numpy.where(ok[:, channel_field], values.low[order], 0.0)
-    high = numpy.where(ok[:, channel_field], values.high[order], 0.0)
+    low = numpy.where(ok[:, channel_grid], values.low[order], 0.0)
+    high = numpy.where(ok[:, channel_grid], values.high[order], 0.0)
     result = Values.none(count, values.low.shape[1], values.finite.shape[1])
     rows = at[order][starts]
     result.low[rows] = numpy.add.reduceat(low * w, starts)

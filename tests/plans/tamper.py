@@ -24,7 +24,10 @@ def check_verify(rng, tessera, mesh_path, vdb_path, file, samples, counts):
 
 def change_value(rng, file, samples):
     """Changes a random active voxel of a value grid by a tenth of the field's range or more."""
-    grids = [(g, i) for level in file.levels() for g, _, _, i in file.channel_grids(level) if g is not None and len(g.points)]
+    grids = [
+        (file.grid(name, level), i) for level in file.levels() for i, field in enumerate(file.fields) for name in field["grids"]
+        if file.grid(name, level) is not None and len(file.grid(name, level).points)
+    ]  # fmt: skip
     if not grids:
         return None
     grid, position = grids[int(rng.integers(len(grids)))]

@@ -104,6 +104,8 @@ class TesseraFile:
         self.extend = int(self.metadata.get("tessera_extend", "0"))
         self.fields = json.loads(self.metadata["tessera_fields"])
         self.report = json.loads(self.metadata["tessera_report"])
+        self.samples_report = json.loads(self.metadata["tessera_samples_report"]) if "tessera_samples_report" in self.metadata else None
+        self.voxel_shift = float(self.metadata.get("tessera_voxel_shift", "0"))
         self.tree = Tree(json.loads(self.metadata["tessera_bricks"]))
         self.flat_level = int(self.metadata["tessera_flat_level"])
         self.bounds = json.loads(self.metadata["tessera_bounds"]) if "tessera_bounds" in self.metadata else None
@@ -126,14 +128,15 @@ class TesseraFile:
         return [g for g in (self.grid(name, level) for level in self.levels()) if g is not None]
 
     def channel_grids(self, level):
-        """(grid, component, channel, field position) of every channel at a level."""
-        channel = 0
-        for position, field in enumerate(self.fields):
+        """(grid, component, channel, position of the grid) of every channel at a level."""
+        channel = position = 0
+        for field in self.fields:
             for name in field["grids"]:
                 grid = self.grid(name, level)
-                for c in range(3 if len(field["grids"]) == 1 and field["components"] == 3 else 1):
+                for c in range(3 if field["components"] == 3 else 1):
                     yield grid, c, channel, position
                     channel += 1
+                position += 1
 
 
 class FileSamples:
@@ -141,31 +144,31 @@ class FileSamples:
 
     def __init__(self, file, mesh_samples):
         self.file, self.mesh = file, mesh_samples
-        self.table, self.channels, self.fields = mesh_samples.table, mesh_samples.channels, mesh_samples.fields
+        self.table, self.channels, self.grids = mesh_samples.table, mesh_samples.channels, mesh_samples.grids
         self.missing = []  # (grid name, points)
 
     def read(self, level, points, fill):
         """Active voxels of the grids of one level; `fill(rows)` gives the values of those rows that aren't."""
         count = len(points)
-        values = Values.none(count, self.channels, self.fields)
+        values = Values.none(count, self.channels, self.grids)
         values.finite[:] = True
-        absent = numpy.zeros((count, self.fields), bool)
+        absent = numpy.zeros((count, self.grids), bool)
         names = {}
         for grid, component, channel, position in self.file.channel_grids(level):
             found = grid.find(points) if grid is not None else numpy.full(count, -1)
             absent[:, position] |= found < 0
-            names[position] = grid.name if grid is not None else f"(no grid of {self.file.fields[position]['name']}, level {level})"
+            names[position] = grid.name if grid is not None else f"(grid {position}, which is absent at level {level})"
             if grid is not None and len(grid.values):
                 values.low[:, channel] = values.high[:, channel] = grid.values[found, component]
         rows = numpy.flatnonzero(absent.any(axis=1))
         if len(rows):
             exact = fill(rows)
-            for position in range(self.fields):
+            for position in range(self.grids):
                 here = absent[rows, position]
                 wanted = here & exact.finite[:, position] & ~exact.broken[:, position]
                 if wanted.any():
                     self.missing.append((names[position], points[rows[wanted]]))
-                channels = numpy.flatnonzero(self.table.channel_field == position)
+                channels = numpy.flatnonzero(self.table.channel_grid == position)
                 at = numpy.ix_(rows[here], channels)
                 values.low[at], values.high[at] = exact.low[here][:, channels], exact.high[here][:, channels]
                 values.finite[rows[here], position] = exact.finite[here, position]
@@ -176,7 +179,7 @@ class FileSamples:
         """Levels layout: from the leaf that owns the point; what no leaf owns, from the grid where the rules end."""
         owner = self.file.tree.owner(level, points)
         owner[owner < 0] = level
-        result = Values.none(len(points), self.channels, self.fields)
+        result = Values.none(len(points), self.channels, self.grids)
         for m in numpy.unique(owner):
             rows = numpy.flatnonzero(owner == m)
             at = points[rows] << (level - int(m)) if m <= level else points[rows] >> (int(m) - level)
