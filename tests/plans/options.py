@@ -54,9 +54,9 @@ def draw_options(rng, mesh, algorithms):
         else:
             use("--resolution", resolution)
     elif refine == "element-size":
-        use("--samples-per-element", round(float(rng.uniform(0.7, 3.5)), 2), "--max-levels", choose(rng, [(1, 1), (3, 2), (3, 3), (2, 5)]))
+        use("--samples-per-element", round(float(rng.uniform(1, 10) if brick_size == 8 else rng.uniform(1, 16)), 2), "--max-levels", choose(rng, [(1, 1), (3, 2), (3, 3), (2, 5)]))
     else:
-        use("--max-error", f"{float(10 ** rng.uniform(-0.5, 1.3)):.2g}%", "--error-measure", choose(rng, [(2, "max"), (1, "rms")]))
+        use("--max-error", f"{float(10 ** rng.uniform(-0.9, 1.2)):.2g}%", "--error-measure", choose(rng, [(2, "max"), (1, "rms")]))
         if rng.random() < 0.5:
             use("--max-levels", rng.integers(2, 6))
         if all(field.location == "cell" for field in mesh.fields):
@@ -79,7 +79,7 @@ def draw_options(rng, mesh, algorithms):
         features.add(f"bounds {kind}")
     if refine != "uniform":
         # Small enough that error refinement ends early and flat grids are capped now and then.
-        use("--max-voxels", int(10.0 ** rng.uniform(4.8, 5.5)) * (2 if brick_size == 16 else 1))
+        use("--max-voxels", int(10.0 ** rng.uniform(4.9, 5.5)) * (2 if brick_size == 16 else 1))
     elif rng.random() < 0.2:
         use("--max-voxels", int(10.0 ** rng.uniform(4.5, 5.3)))
     if rng.random() < 0.25:
