@@ -241,5 +241,6 @@ class Checker:
             bad = rows & ~(ratio <= 1 + 1e-9)
             if bad.any():
                 i = numpy.flatnonzero(bad)[numpy.argmax(numpy.abs(got - middle)[bad])]
-                out.problem("values", f"{grid.name} component {component}: {bad.sum()} {name}s of {rows.sum()} are wrong, worst at {some(points[i:i + 1])}: "
+                out.problem("values", f"{grid.name} component {component}: {bad.sum()} {name}s of {rows.sum()} are wrong, worst at {some(points[i:i + 1])}, "
+                            f"place {(self.file.tree.origin + self.file.tree.level_spacing(grid.level) * points[i]).tolist()}: "
                             f"expected {low[i]!r} to {high[i]!r}, got {got[i]!r}")  # fmt: skip

@@ -263,8 +263,8 @@ class LatticeMesh:
             values.add(p, low, high, table.broken[e], table.channel_grid)
         self.settle(points, state)
         unsure = numpy.flatnonzero(state < IN)
-        _, nearest = self.nearest(points[unsure])
-        on_edge = state[unsure] == MAYBE
+        distance, nearest = self.nearest(points[unsure])
+        on_edge = (state[unsure] == MAYBE) | (distance <= self.place_bound)
         keep = values.take(unsure)
         nearest.low = numpy.where(on_edge[:, None], numpy.minimum(nearest.low, keep.low), nearest.low)
         nearest.high = numpy.where(on_edge[:, None], numpy.maximum(nearest.high, keep.high), nearest.high)

@@ -39,7 +39,7 @@ def draw_options(rng, mesh, algorithms):
     def use(*words):
         arguments.extend(str(w) for w in words)
 
-    refine = choose(rng, [(3, "uniform"), (3, "element-size"), (4, "error")])
+    refine = choose(rng, [(2, "uniform"), (3, "element-size"), (4, "error")])
     features.add(refine)
     use("--refine", refine)
     brick_size = choose(rng, [(3, 8), (1, 16)])
@@ -95,10 +95,12 @@ def draw_options(rng, mesh, algorithms):
     if rng.random() < 0.15:
         use("--unit-scale", choose(rng, [(1, 1000), (1, 0.01)]) if longest > 1e-3 else 1e6)
         features.add("unit scale")
+    # Drawn in any case, so that a seed makes the same plan for every list of algorithms.
+    draws = rng.random(2)
     algorithm = "software"
     others = [a for a in algorithms if a != "software"]
-    if others and ("software" not in algorithms or rng.random() < 0.08):
-        algorithm = others[int(rng.integers(len(others)))]
+    if others and ("software" not in algorithms or draws[0] < 0.1):
+        algorithm = others[int(draws[1] * len(others))]
     features.add(algorithm)
     use("--algorithm", algorithm, "--threads", rng.integers(1, 3))
     return arguments, features
