@@ -49,7 +49,8 @@ def stored_points(mesh, file, level, kept):
     cube = numpy.stack(numpy.meshgrid(*(numpy.arange(n),) * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     if file.layout == "levels":
         points = (tree.bricks[level][:, None, :] * n + cube).reshape(-1, 3)
-        return points[kept.keeps(level, points)]
+        # Corners of coarse bricks beyond the box are needed only where there are such bricks: places.py looks for them.
+        return points[kept.inside(level, points)] if file.bounds else points
     if not file.bounds:
         # All of the mesh is stored, so its whole box is looked at.
         low, high = (numpy.floor((x - tree.origin) / tree.level_spacing(level)).astype(numpy.int64) for x in mesh.bounds())
@@ -133,10 +134,10 @@ class Checker:
         if len(outside):
             out.problem("bounds", f"coverage level {level} is active beyond the bounds at {some(outside)}")
         stray = stray[self.kept.keeps(level, stray)]
-        if len(stray) and self.file.layout == "levels":
-            out.problem("bricks", f"coverage level {level} is active in no brick of the level at {some(stray)}")
-        elif len(stray):
-            spilt = numpy.concatenate([spilt, stray[self.samples.states(level, stray) == OUT]])
+        foreign = stray[self.file.tree.owner(level, stray) != level]
+        if len(foreign) and self.file.layout == "levels":
+            out.problem("bricks", f"coverage level {level} is active in no brick of the level at {some(foreign)}")
+        spilt = numpy.concatenate([spilt, stray[self.samples.states(level, stray) == OUT]])
         if len(spilt):
             distance, _ = self.samples.level(level).nearest(spilt)
             bound = SPILL[self.algorithm]

@@ -89,9 +89,7 @@ class PlaceChecker:
         return result
 
     def missing(self, reader):
-        """With an extension, every voxel that a place in the mesh needs is active."""
-        if not self.file.extend:
-            return
+        """Every voxel in the mesh that a place in the mesh needs is active, and with an extension those outside too."""
         absent = {}
         for name, points in reader.missing:
             absent.setdefault(name, []).append(points)
@@ -174,13 +172,13 @@ class PlaceChecker:
                             f"but the largest error found is {most!r}")  # fmt: skip
 
     def sample_report(self, inside, sure):
-        """`tessera_samples_report` speaks of the exact samples, and is there only when the file's own report may differ."""
+        """`tessera_samples_report` speaks of the exact samples, and is there only when the file's voxels aren't those or miss some."""
         file = self.file
         half = any(grid.half for grid in file.grids.values())
         if file.samples_report is None:
             return
         self.findings.count("samples reports")
-        if not half and file.flat_level == 0:
+        if not half and file.flat_level == 0 and (file.layout == "levels" or file.extend):
             self.findings.problem("metadata", "tessera_samples_report is there, but the voxels are the samples")
         if inside.any():
             got = self.read_levels(self.oracle, self.places[inside], sure[inside])

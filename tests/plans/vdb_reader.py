@@ -6,7 +6,7 @@ import json
 import numpy
 import pyopenvdb
 
-from plans.geometry import Values
+from plans.geometry import IN, Values
 from plans.oracle import Tree, keys_of
 
 MOST_DENSE = 6_000_000
@@ -140,12 +140,16 @@ class TesseraFile:
 
 
 class FileSamples:
-    """Voxels as a reader of the file finds them; what isn't active is filled from the mesh and remembered."""
+    """Voxels as a reader of the file finds them; what isn't active is filled from the mesh and remembered.
+
+    In a flat file without an extension, what isn't active has no value: the report leaves out the places that need it.
+    """
 
     def __init__(self, file, mesh_samples):
         self.file, self.mesh = file, mesh_samples
         self.table, self.channels, self.grids = mesh_samples.table, mesh_samples.channels, mesh_samples.grids
-        self.missing = []  # (grid name, points)
+        self.missing = []  # (grid name, points): needed where they may be absent only beyond the mesh, and there is an extension
+        self.has_gaps = file.layout == "flat" and not file.extend
 
     def read(self, level, points, fill):
         """Active voxels of the grids of one level; `fill(rows)` gives the values of those rows that aren't."""
@@ -163,15 +167,16 @@ class FileSamples:
         rows = numpy.flatnonzero(absent.any(axis=1))
         if len(rows):
             exact = fill(rows)
+            in_mesh = self.mesh.states(level, points[rows]) == IN
             for position in range(self.grids):
                 here = absent[rows, position]
-                wanted = here & exact.finite[:, position] & ~exact.broken[:, position]
+                wanted = here & exact.finite[:, position] & ~exact.broken[:, position] & (in_mesh | (self.file.extend > 0))
                 if wanted.any():
                     self.missing.append((names[position], points[rows[wanted]]))
                 channels = numpy.flatnonzero(self.table.channel_grid == position)
                 at = numpy.ix_(rows[here], channels)
                 values.low[at], values.high[at] = exact.low[here][:, channels], exact.high[here][:, channels]
-                values.finite[rows[here], position] = exact.finite[here, position]
+                values.finite[rows[here], position] = exact.finite[here, position] & ~self.has_gaps
                 values.broken[rows[here], position] = exact.broken[here, position]
         return values
 
