@@ -15,6 +15,9 @@ if(TARGET tessera)
     COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
             --count 20 --seed 1)
   set_tests_properties(mutated_meshes kill_test PROPERTIES PROCESSORS 2)
+  add_test(NAME random_plans
+    COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/random_plans.py --tessera $<TARGET_FILE:tessera> --seeds 1-25
+            --keep ${PROJECT_BINARY_DIR}/plans)
   if(NOT TESSERA_SANITIZE)
     add_test(NAME external_check_against_vtk
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/external/check_against_vtk.py --tessera $<TARGET_FILE:tessera>
