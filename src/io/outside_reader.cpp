@@ -3,6 +3,7 @@
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Interpolation.h>
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 
@@ -127,32 +128,13 @@ class OutsideReader {
         return key.level;
     }
 
-    // Whether the voxels around are inactive because their values aren't finite.
-    bool isNotFinite(std::size_t sample, int level, const GridPlan& plan) const {
-        const BrickTree& tree = file_.tree;
-        const Vec3d index = samples_.placeWorld(sample, tree.originWorld()) / tree.spacingWorld(level);
-        for (int c = 0; c < 8; ++c) {
-            const Vec3i p = Vec3i(glm::floor(index + kOnPlane)) + cornerOffset(c);
-            const std::int64_t leaf = tree.findLeafAt(level, p);
-            for (int k = plan.firstChannel; k < plan.firstChannel + plan.components; ++k) {
-                bool covered = false;
-                float value = 0;
-                if (leaf >= 0 && tree.leaves()[std::size_t(leaf)].level == level)
-                    value = file_.store.value(std::size_t(leaf),
-                                              p - tree.ownedPoints(tree.leaves()[std::size_t(leaf)]).min, k,
-                                              covered);
-                if (const Tile* tile = file_.store.extensionAt(level, p); !covered && tile)
-                    value = tile->channel(k)[offsetInTile(p)];
-                if (!std::isfinite(value)) return true;
-            }
-        }
-        return false;
-    }
-
     template <class Grid>
     void read(const Grid& grid, std::size_t f, const GridPlan& plan, int level, OutsideReading& reading) {
         std::mutex mutex;
         const SampledField& field = samples_.fields()[f];
+        // Where a field has values that aren't finite, so may the voxels around have none.
+        const bool isFinite = std::all_of(field.field->values.begin(), field.field->values.end(),
+                                          [](double value) { return std::isfinite(float(value)); });
         const double shift = file_.voxelShift * file_.tree.spacingWorld(level);
         parallelForChunks(
             execution_, std::int64_t(level_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
@@ -162,10 +144,8 @@ class OutsideReader {
                     const Vec3d world = samples_.placeWorld(i, Vec3d(0)) + shift;
                     const openvdb::Vec3d index = grid.transform().worldToIndex(filePlace(file_, world));
                     if (!isComplete(accessor, index)) {
-                        if (isNotFinite(i, level, plan) || squares_[i] < 0) {
-                            squares_[i] = -1;
-                            continue;
-                        }
+                        squares_[i] = -1;
+                        if (!isFinite) continue;
                         const std::lock_guard lock(mutex);
                         ++reading.incomplete;
                         if (reading.firstProblem.empty())

@@ -116,6 +116,8 @@ void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::v
     ErrorReport ofFile = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);
     for (std::size_t f = 0; f < ofFile.fields.size(); ++f)
         ofFile.fields[f].name = result.report.fields[f].name;
+    // With an extension only voxels without a finite value are absent, and those were skipped.
+    if (shape.layers > 0) ofFile.incomplete = 0;
     if (isCoarser || isRounded || ofFile.incomplete > 0) result.samplesReport = std::move(result.report);
     result.report = std::move(ofFile);
 }

@@ -187,17 +187,13 @@ class VoxelChecker {
         const BrickTree& bricks = *stored_.bricks;
         BrickStore samples(bricks.brickCells(), bricks.leafCount(), store_.channels());
         std::vector<std::vector<std::size_t>> beyond(std::size_t(bricks.levelCount()));
-        const IndexBox kept = kept_.corners(0);
         for (std::size_t leaf = 0; leaf < bricks.leafCount(); ++leaf) {
             const BrickKey& key = bricks.leaves()[leaf];
             takeSamples(leaf, key, samples);
-            const IndexBox owned = bricks.ownedPoints(key);
-            const int up = key.level - stored_.flatLevel;
-            const IndexBox own{owned.min * (1 << std::max(up, 0)), owned.max * (1 << std::max(up, 0))};
-            if (up > 0 && intersect(own, kept) != own) beyond[std::size_t(key.level)].push_back(leaf);
+            if (!kept_.all() && sticksOut(key)) beyond[std::size_t(key.level)].push_back(leaf);
         }
         for (int level = 0; level < bricks.levelCount(); ++level) {
-            if (kept_.all() || beyond[std::size_t(level)].empty()) continue;
+            if (beyond[std::size_t(level)].empty()) continue;
             std::vector<IndexBox> boxes;
             for (const std::size_t leaf : beyond[std::size_t(level)])
                 boxes.push_back(bricks.ownedPoints(bricks.leaves()[leaf]));
@@ -205,11 +201,18 @@ class VoxelChecker {
                 ->resample(
                     bricks.lattice(level), boxes,
                     [&](std::size_t box, const Block& block) {
-                        takeBeyond(block, level, beyond[std::size_t(level)][box], samples);
+                        const std::size_t leaf = beyond[std::size_t(level)][box];
+                        takeBeyond(block, bricks.leaves()[leaf], leaf, samples);
                     },
                     execution_);
         }
         return samples;
+    }
+
+    bool sticksOut(const BrickKey& key) const {
+        bool out = false;
+        forEachGridPoint(key, [&](const Vec3i&, const Vec3i& p) { out = out || !kept_.keeps(0, p); });
+        return out;
     }
 
     /// @param visit called with the local point and its point of the grid, for those that are one.
@@ -248,21 +251,16 @@ class VoxelChecker {
         });
     }
 
-    void takeBeyond(const Block& block, int level, std::size_t leaf, BrickStore& samples) const {
-        const int up = level - stored_.flatLevel, n = samples.tilesPerEdge();
-        const IndexBox kept = kept_.corners(0);
-        Vec3i p;
-        for (p.z = block.box.min.z; p.z < block.box.max.z; ++p.z)
-            for (p.y = block.box.min.y; p.y < block.box.max.y; ++p.y)
-                for (p.x = block.box.min.x; p.x < block.box.max.x; ++p.x) {
-                    if (!block.covered(p) || kept.contains(p * (1 << up))) continue;
-                    const Vec3i local = p - block.box.min;
-                    Tile& tile =
-                        samples.ensureTile(leaf, ((local.x >> 3) * n + (local.y >> 3)) * n + (local.z >> 3));
-                    tile.cover(offsetInTile(local));
-                    for (int c = 0; c < block.channels; ++c)
-                        tile.values[std::size_t(c * kTilePoints + offsetInTile(local))] = block.value(c, p);
-                }
+    void takeBeyond(const Block& block, const BrickKey& key, std::size_t leaf, BrickStore& samples) const {
+        const int n = samples.tilesPerEdge();
+        forEachGridPoint(key, [&](const Vec3i& local, const Vec3i& p) {
+            const Vec3i at = block.box.min + local;
+            if (kept_.keeps(0, p) || !block.covered(at)) return;
+            Tile& tile = samples.ensureTile(leaf, ((local.x >> 3) * n + (local.y >> 3)) * n + (local.z >> 3));
+            tile.cover(offsetInTile(local));
+            for (int c = 0; c < block.channels; ++c)
+                tile.values[std::size_t(c * kTilePoints + offsetInTile(local))] = block.value(c, at);
+        });
     }
 
     bool agrees(int channel, float expected, float found) const {
@@ -317,7 +315,7 @@ class VoxelChecker {
                 const Vec3i p = key.index * kTileSize + pointInTile(offset);
                 if (other != found.end() && other->second.covered(offset))
                     compareAt(key.level, p, tile, other->second, offset);
-                else if (anyFinite(tile, offset))
+                else if (isActive(tile, offset))
                     note(result_.missingDerived, key.level, p,
                          "has no value, though the mesh needs one there");
             }
@@ -330,10 +328,16 @@ class VoxelChecker {
                          "is active and neither in the mesh nor part of its extension");
         }
     }
-    /// A point without a finite value in any field isn't active anywhere.
-    bool anyFinite(const Tile& tile, int offset) const {
-        for (int c = 0; c < store_.channels(); ++c)
-            if (std::isfinite(tile.channel(c)[offset])) return true;
+    /// Whether any grid has a finite value there.
+    bool isActive(const Tile& tile, int offset) const {
+        int first = 0;
+        for (const int components : grids_) {
+            bool isFinite = true;
+            for (int c = first; c < first + components; ++c)
+                isFinite = isFinite && std::isfinite(tile.channel(c)[offset]);
+            if (isFinite) return true;
+            first += components;
+        }
         return false;
     }
 
