@@ -374,9 +374,9 @@ TEST_F(VdbFileTest, VoxelShiftMovesTheTransformsOnly) {
         VdbWriteOptions options;
         options.upAxis = axis;
         options.unitScale = 10;
-        writeVdb(file("plain.vdb"), kMixed, plain, nullptr, nullptr, options, {});
+        writeVdb(file("plain.vdb"), kMixed, plain, options, {});
         options.voxelShift = -0.5;
-        writeVdb(file("shifted.vdb"), kMixed, shifted, nullptr, nullptr, options, {});
+        writeVdb(file("shifted.vdb"), kMixed, shifted, options, {});
         for (int level : {0, 1, 3}) {
             const std::string name = "T_level_" + std::to_string(level);
             const auto before = findGrid<openvdb::FloatGrid>(file("plain.vdb"), name);

@@ -142,6 +142,8 @@ std::string countsByField(const ErrorReport& report, const Count& countOf) {
 }
 
 std::string errorText(const ErrorReport& report) {
+    if (report.nodes + report.centroids == 0)
+        return "  no node or centroid lies inside the bounds, so no error was measured\n";
     const char* const share = "of range";
     TableRows rows{{"error", "max", share, "99.9 %", share, "rms", share}},
         places{{"largest error of", "at"}};
@@ -171,6 +173,9 @@ std::string errorText(const ErrorReport& report) {
         return f.samples > 0 ? report.coveredPoints - f.validPoints : 0;
     });
     if (!invalid.empty()) text += fmt::format("  voxels in the mesh without a finite value: {}\n", invalid);
+    if (report.incomplete > 0)
+        text += fmt::format("  {} samples lie beside voxels that aren't there, where no error was measured\n",
+                            formatCount(report.incomplete));
     if (report.outsideBricks > 0)
         text += fmt::format("  {} samples lie outside the bounds and don't count\n",
                             formatCount(report.outsideBricks));

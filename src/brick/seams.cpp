@@ -122,8 +122,9 @@ void Reconstruction::nearestValues(int level, const Vec3i& p, int firstChannel,
     if (found.element < 0) found = nearest.find(place, std::numeric_limits<double>::infinity());
     for (std::size_t c = 0; c < values.size(); ++c) {
         const auto [field, component] = channelOf_[std::size_t(firstChannel) + c];
-        values[c] = found.element < 0 ? std::numeric_limits<double>::quiet_NaN()
-                                      : found.value(mesh_->fields[std::size_t(field)], component);
+        constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+        values[c] = found.element < 0 ? kNone : found.value(mesh_->fields[std::size_t(field)], component);
+        if (!std::isfinite(float(values[c]))) values[c] = kNone;  // as samples are
     }
 }
 
