@@ -66,7 +66,7 @@ class ResampleRun {
           repair_(repairOptions(arguments.repair)),
           choice_(chooseResampler(arguments.algorithm.name, settings_.refine.bind)),
           resampler_(*choice_.resampler),
-          session_(arguments.common) {
+          session_(arguments.common, arguments.dryRun ? std::string() : arguments.output) {
         settings_.write.algorithm = resampler_.name();
         if (!choice_.reason.empty()) session_.print(choice_.reason + "\n");
     }
@@ -220,7 +220,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"algorithm_reason", choice_.reason},
                 {"sample_format", nameOf(settings_.refine.bind.format)},
                 {"criterion", arguments_.refine},
-                {"layout", arguments_.layout},
+                {"layout", settings_.write.layout == VdbLayout::flat ? "flat" : "levels"},
                 {"threads", session_.execution.threadCount()}};
     if (isSeries_) report.update(stepJson(step.source));
     Json rest = arguments_.dryRun ? dryRun(step, file, selection, options, times)
@@ -280,7 +280,9 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     const OutputShape shape = outputShape();
     if (shape.layout == VdbLayout::flat) {
         const FlatGridPlan plan = planFlatGrid(result.tree, selection.channels, shape);
-        if (plan.isCapped) session_.warn(fmt::format("{}: {}", step.output, plan.note));
+        const bool isNamed = step.output != kStandardOutput;
+        if (plan.isCapped)
+            session_.warn(fmt::format("{}: {}", isNamed ? step.output : "standard output", plan.note));
     }
     shapeForFile(file.mesh, selection.fields, selection.outputs, resampler_, settings_.refine.bind, shape,
                  result, session_.execution);
@@ -293,7 +295,8 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     options.time = source.time;
     // Where every target gives the same bits, naming one would make the file depend on the processor.
     if (!resampler_.targetsAgree()) options.target = result.target;
-    VdbWriteResult written = writeVdb(step.output, selection.outputs, result, options, session_.execution);
+    VdbWriteResult written =
+        settings_.format->write(step.output, selection.outputs, result, options, session_.execution);
     times.writeMs = timer.elapsedMs();
     return written;
 }

@@ -8,6 +8,7 @@
 
 #include "base/vec.h"
 #include "brick/refine.h"
+#include "io/output_formats.h"
 #include "io/shape_output.h"
 #include "io/vdb_file.h"
 
@@ -53,7 +54,9 @@ struct ResampleArguments {
     CommonOptions common;
     std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
     std::string output, times;        ///< times: "a:b"; empty: all
-    std::string refine = "element-size", layout = "levels", upAxis = "keep", errorMeasure = "max";
+    std::string format;               ///< of standard output; empty: the default
+    std::string layout;               ///< empty: levels where the output's format can hold them, else flat
+    std::string refine = "element-size", upAxis = "keep", errorMeasure = "max";
     AlgorithmArguments algorithm;
     RepairArguments repair;
     std::optional<int> resolution, maxLevels;
@@ -73,6 +76,7 @@ struct ResampleArguments {
 /// The same, checked and converted; what depends on the mesh (field indices) is still missing.
 struct ResampleSettings {
     RefineOptions refine;
+    const OutputFormat* format = nullptr;  ///< of the output
     VdbWriteOptions write;
     OutputShape shape;
     std::vector<FieldChoice> fields;       ///< empty: all

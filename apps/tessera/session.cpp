@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "io/atomic_file.h"
 #include "report_text.h"
 #include "series_steps.h"
 
@@ -47,9 +48,9 @@ void noteStart() {
     if (::access(program.c_str(), X_OK) != 0 && name) program = std::filesystem::absolute(name, error);
 }
 
-Session::Session(const CommonOptions& options)
+Session::Session(const CommonOptions& options, const std::string& output)
     : progress(!options.quiet),
-      prints_(!options.quiet && options.jsonPath != "-"),
+      prints_(!options.quiet && options.jsonPath != kStandardOutput && output != kStandardOutput),
       isolated_(options.reader.kind == "isolated") {
     execution.threads = options.threads;
     execution.cancel = &interruptFlag();
