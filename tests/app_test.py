@@ -345,6 +345,124 @@ class Repair(AppTest):
         self.reject(2, "--repair-max-volume-loss", "info", self.thin, "--repair", "--repair-max-volume-loss", "2")
 
 
+class Outputs(AppTest):
+    """What an output's name says."""
+
+    COARSE = ("--refine", "uniform", "--resolution", "9", "--quiet")
+
+    def test_other_endings_are_refused_before_any_work(self):
+        for name in ("x", "x.h5", "x.jpg", "x.vdb.gz", "x.", ".vdb", "vdb", "x.vt", "x_####", "/dev/stdout"):
+            self.reject(2, ".vdb .nvdb .vti", "resample", "nothing.vtu", "-o", name)
+        self.reject(2, ".vdb .nvdb .vti", "resample", "nothing.vtu", "-o", "x.h5", "--dry-run")
+        self.reject(2, ".exr .png .jpg", "slice", "nothing.vtu", "-o", "x.jpg")
+        self.reject(2, ".vtu .vtk", "tets", "nothing.vtu", "-o", "x.vtk")
+        self.reject(2, ".png .jpg", "picture", "nothing.vdb", "-o", "x.jpg")
+
+    def test_each_ending_is_that_format_in_upper_case_too(self):
+        for name, head in (("a.vdb", b" BDV"), ("a.nvdb", b"NanoVDB0"), ("a.vti", b"<?xml"), ("b.VDB", b" BDV"), ("b.Nvdb", b"NanoVDB0"), ("b.VTI", b"<?xml")):
+            self.succeed("resample", self.cube, "-o", name, *self.COARSE)
+            self.assertTrue((self.folder / name).read_bytes().startswith(head), name)
+        self.succeed("tets", self.cube, "-o", "tets.VTU", "--quiet")
+        self.succeed("picture", "a.vdb", "-o", "slice.PNG", "--quiet")
+
+    def test_formats_without_levels_are_flat(self):
+        for ending in ("nvdb", "vti"):
+            report = self.report("resample", self.cube, "-o", f"a.{ending}", *self.COARSE)
+            self.assertEqual((report["layout"], report["output"]), ("flat", f"a.{ending}"))
+            self.assertGreater(report["write"]["active_voxels"], 9**3)  # with the extension
+            self.assertEqual(report["write"]["bytes"], (self.folder / f"a.{ending}").stat().st_size)
+            self.succeed("resample", self.cube, "-o", f"b.{ending}", "--layout", "flat", *self.COARSE)
+            self.assertEqual((self.folder / f"a.{ending}").read_bytes(), (self.folder / f"b.{ending}").read_bytes())
+            self.reject(2, f"--layout levels .{ending} .vdb", "resample", self.cube, "-o", f"c.{ending}", "--layout", "levels")
+            self.reject(2, f"--half .{ending}", "resample", self.cube, "-o", f"c.{ending}", "--half")
+        self.reject(2, "--up-axis .vti", "resample", self.cube, "-o", "c.vti", "--up-axis", "y")
+        self.assertEqual(self.report("resample", self.cube, "-o", "a.vdb", *self.COARSE)["layout"], "levels")
+
+    def test_an_image_lies_over_its_mesh(self):
+        self.succeed("resample", self.stokes, "-o", "a.vti", "--refine", "uniform", "--resolution", "30", "--extend", "0", "--quiet")
+        mesh, image = self.report("info", self.stokes)["mesh"], self.report("info", "a.vti")["mesh"]
+        (low, high), (first, last) = mesh["bounds"], image["bounds"]
+        spacing = max(b - a for a, b in zip(low, high)) / 29
+        for a, b, c, d in zip(low, first, high, last):
+            # Every lattice point in the mesh is in the image, and no other.
+            self.assertTrue(0 <= b - a < spacing and 0 <= c - d < spacing, (a, b, c, d))
+
+    def test_a_series_of_images(self):
+        for i in range(2):
+            self.write(f"run_{i}.vtu", vtu_text())
+        self.succeed("resample", "run_0.vtu", "run_1.vtu", "-o", "out_####.vti", *self.COARSE)
+        self.assertTrue((self.folder / "out_0000.vti").exists() and (self.folder / "out_0001.vti").exists())
+
+    def test_standard_output_gets_the_file_and_nothing_else(self):
+        self.succeed("resample", self.cube, "-o", "a.vdb", *self.COARSE)
+        for command, names in (
+            (["resample", self.cube, *self.COARSE[:-1]], ("a.vdb", "a.nvdb", "a.vti")),
+            (["slice", self.cube, "--resolution", "20"], ("a.exr", "a.png")),
+            (["tets", self.cube], ("a.vtu",)),
+            (["picture", "a.vdb"], ("b.png",)),
+        ):
+            for i, name in enumerate(names):
+                with self.subTest(command=command, name=name):
+                    self.succeed(*command, "-o", name, "--quiet")
+                    whole = (self.folder / name).read_bytes()
+                    kind = name.partition(".")[2]
+                    for extra in ([["--format", kind]] if len(names) > 1 else []) + ([[]] if i == 0 else []):
+                        result = subprocess.run([TESSERA, *map(str, command), "-o", "-", *extra], capture_output=True, timeout=300, cwd=self.folder)
+                        self.assertEqual((result.returncode, result.stderr), (0, b""))
+                        self.assertEqual(result.stdout, whole)
+        self.assertNotIn("-", os.listdir(self.folder))
+
+    def test_standard_output_is_for_one_thing(self):
+        for command in (["resample", self.cube], ["slice", self.cube], ["tets", self.cube], ["picture", "a.vdb"]):
+            self.reject(2, "--output --json standard", *command, "-o", "-", "--json", "-")
+        self.reject(2, "--format a.vdb", "resample", self.cube, "-o", "a.vdb", "--format", "vti")
+        self.reject(2, "--format", "resample", self.cube, "-o", "-", "--format", "h5")
+        self.succeed("resample", self.cube, "-o", "-", "--dry-run")
+        self.write("run_0.vtu", vtu_text())
+        self.reject(2, "%04d", "resample", self.cube, "run_0.vtu", "-o", "-")
+
+    def test_standard_output_that_takes_no_file(self):
+        command = [TESSERA, "resample", str(self.cube), "-o", "-", *self.COARSE]
+        terminal, other = os.openpty()
+        result = subprocess.run(command, stdout=other, stderr=subprocess.PIPE, text=True, cwd=self.folder, timeout=300)
+        os.close(terminal)
+        os.close(other)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("terminal", result.stderr)
+        ended, other = os.pipe()
+        os.close(ended)  # whoever reads has gone
+        result = subprocess.run(command, stdout=other, stderr=subprocess.PIPE, text=True, cwd=self.folder, timeout=300)
+        os.close(other)
+        self.assertEqual((result.returncode, result.stderr), (1, ""))
+        with open("/dev/full", "w") as full:
+            result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=self.folder, timeout=300)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, r"^tessera: can't write standard output: No space left.*\n$")
+        result = subprocess.run(command, stderr=subprocess.PIPE, text=True, cwd=self.folder, timeout=300, preexec_fn=lambda: os.close(1))
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("standard output: Bad file", result.stderr)
+
+    def test_an_interrupt_ends_a_run_whose_reader_is_stuck(self):
+        command = [TESSERA, "resample", str(self.stokes), "-o", "-", "--quiet"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=self.folder)
+        self.addCleanup(process.kill)
+        self.assertEqual(process.stdout.read(4), b" BDV")  # and then nothing more of the megabytes that follow
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(timeout=60), 143)
+
+    def test_nanovdb_files_are_not_read(self):
+        self.succeed("resample", self.cube, "-o", "a.nvdb", *self.COARSE)
+        for command in (["info", "a.nvdb"], ["resample", "a.nvdb", "-o", "b.vdb"], ["verify", self.cube, "a.nvdb"], ["picture", "a.nvdb", "-o", "a.png"]):
+            self.reject(2, "a.nvdb NanoVDB .vdb", *command)
+
+    def test_disk_full_leaves_nothing(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+
+        for name in ("out.vti", "out.nvdb"):
+            self.reject(1, name, "resample", self.stokes, "-o", name, "--quiet", "--refine", "uniform", "--resolution", "60", preexec_fn=limit)
+
+
 class FailingOutputs(AppTest):
     def test_not_writable(self):
         (self.folder / "folder.vdb").mkdir()
@@ -1016,7 +1134,7 @@ class Series(AppTest):
             with self.subTest(pattern=pattern):
                 self.succeed("resample", "run_0.vtu", "run_1.vtu", "-o", pattern, *self.COARSE)
                 self.assertTrue((self.folder / name).exists(), sorted(os.listdir(self.folder)))
-        for pattern in ("%s.vdb", "%.vdb", "a%", "%-4d.vdb", "%004d.vdb", "%x.vdb", "%4%.vdb"):
+        for pattern in ("%s.vdb", "%.vdb", "a%b.vdb", "%-4d.vdb", "%004d.vdb", "%x.vdb", "%4%.vdb"):
             with self.subTest(pattern=pattern):
                 self.reject(2, "%04d", "resample", "run_0.vtu", "run_1.vtu", "-o", pattern, *self.COARSE)
         for pattern in ("same.vdb", "same%%.vdb"):

@@ -6,6 +6,8 @@ if(TESSERA_BUILD_IO)
     endif()
   endforeach()
   tessera_test(vdb_metadata_test LINK io)
+  tessera_test(nvdb_test LINK io PRIVATE_LINK tessera_nanovdb)
+  tessera_test(vti_test LINK io PRIVATE_LINK tessera_openvdb VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel VTK::IOXML)
   # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
   foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)
     tessera_program(replay_${name} SOURCES fuzz/replay.cpp fuzz/${name}.cpp LINK io)

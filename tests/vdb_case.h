@@ -1,10 +1,12 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <bit>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -35,6 +37,25 @@ class VdbFileTest : public testing::Test {
         return std::size_t(std::distance(fs::directory_iterator(directory_), fs::directory_iterator()));
     }
     fs::path directory_;
+};
+
+// Lets no file grow beyond some bytes while it lives; a write past that fails as on a full disk.
+class FileSizeLimit {
+  public:
+    explicit FileSizeLimit(rlim_t bytes) {
+        previousHandler_ = std::signal(SIGXFSZ, SIG_IGN);
+        getrlimit(RLIMIT_FSIZE, &previous_);
+        const rlimit limit{bytes, previous_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FileSizeLimit() {
+        setrlimit(RLIMIT_FSIZE, &previous_);
+        std::signal(SIGXFSZ, previousHandler_);
+    }
+
+  private:
+    rlimit previous_{};
+    void (*previousHandler_)(int) = nullptr;
 };
 
 inline std::string readBytes(const std::string& path) {
@@ -132,6 +153,26 @@ inline void addExtension(BrickStore& store, int level, const Vec3i& p, float fir
     tile.cover(offsetInTile(p));
     for (int c = 0; c < store.channels(); ++c)
         tile.values[std::size_t(c * kTilePoints + offsetInTile(p))] = first + float(c);
+}
+
+/// Bricks of one level about the origin, as flattening leaves them, with two points of an extension.
+inline constexpr double kFlatSpacing = 0.125;
+inline BrickResult flatResult(int channels, ValueFunction value = valueAt,
+                              CoverFunction covered = coveredAt) {
+    std::vector<BrickKey> leaves;
+    for (int i = 0; i < 8; ++i) leaves.push_back({0, Vec3i(i & 1, i >> 1 & 1, i >> 2) - 1});
+    leaves.pop_back();
+    BrickResult result = makeResult({0, 0, 0}, kFlatSpacing, 16, leaves, channels, value, covered);
+    result.bricks = result.tree;
+    addExtension(result.store, 0, {3, 5, 17}, 100);
+    addExtension(result.store, 0, {8, 9, 10}, 200);
+    return result;
+}
+inline VdbWriteOptions flatOptions(int layers = 1) {
+    VdbWriteOptions options;
+    options.layout = VdbLayout::flat;
+    options.layers = layers;
+    return options;
 }
 
 inline const std::vector<OutputField> kScalar{{"f", "f", "point", 1, 0}};

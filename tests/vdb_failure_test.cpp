@@ -1,7 +1,4 @@
-#include <sys/resource.h>
-
 #include <atomic>
-#include <csignal>
 
 #include "base/error.h"
 #include "io/atomic_file.h"
@@ -37,25 +34,6 @@ TEST_F(VdbFailureTest, UnwritablePlacesAreRefusedAtOnce) {
     EXPECT_EQ(readBytes(file("plain")), "x");
     EXPECT_EQ(fileCount(), 1u) << "a check leaves nothing behind";
 }
-
-// Lets no file grow beyond some bytes while it lives; a write past that fails as on a full disk.
-class FileSizeLimit {
-  public:
-    explicit FileSizeLimit(rlim_t bytes) {
-        previousHandler_ = std::signal(SIGXFSZ, SIG_IGN);
-        getrlimit(RLIMIT_FSIZE, &previous_);
-        const rlimit limit{bytes, previous_.rlim_max};
-        setrlimit(RLIMIT_FSIZE, &limit);
-    }
-    ~FileSizeLimit() {
-        setrlimit(RLIMIT_FSIZE, &previous_);
-        std::signal(SIGXFSZ, previousHandler_);
-    }
-
-  private:
-    rlimit previous_{};
-    void (*previousHandler_)(int) = nullptr;
-};
 
 TEST_F(VdbFailureTest, FailedWriteLeavesTheOldFileAlone) {
     writeBytes(file("out.vdb"), "precious");

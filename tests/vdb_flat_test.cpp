@@ -80,13 +80,6 @@ struct FlatCase {
     }
 };
 
-VdbWriteOptions flatOptions(int layers) {
-    VdbWriteOptions options;
-    options.layout = VdbLayout::flat;
-    options.layers = layers;
-    return options;
-}
-
 TEST_F(VdbFlatTest, FlatLayoutReconstructsCoarseBricks) {
     FlatCase flat(kWide, wide);
     flat.flatten({0, {}, 0});

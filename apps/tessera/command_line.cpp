@@ -213,8 +213,8 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
         ->group(group);
     command
         .add_option("--layout", a.layout,
-                    "levels: one grid a field and level. flat: one grid a field at the finest spacing "
-                    "(default: levels)")
+                    "levels: one grid a field and level (default for .vdb). flat: one grid a field at the "
+                    "finest spacing (.nvdb and .vti hold nothing else)")
         ->check(CLI::IsMember({"levels", "flat"}))
         ->group(group);
     command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
@@ -246,6 +246,29 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
     addTimeStep(command, a.timeStep)->group(group);
 }
 
+/// What standard output gets, which has no ending. The first kind is the default.
+void addFormat(CLI::App& command, std::string& format, const std::vector<std::string>& kinds) {
+    command
+        .add_option("--format", format,
+                    fmt::format("with -o -: what to write to standard output (default: {})", kinds.front()))
+        ->check(CLI::IsMember(kinds));
+}
+
+std::vector<std::string> formatNames() {
+    std::vector<std::string> names;
+    for (const OutputFormat& format : outputFormats()) names.emplace_back(format.name);
+    return names;
+}
+
+/// "the file, by its ending: .a (A), .b (B)"
+std::string fileKinds() {
+    std::string text = "the file; its ending says what it is: ";
+    for (const OutputFormat& format : outputFormats())
+        text += fmt::format("{}.{} ({})", &format == &outputFormats().front() ? "" : ", ", format.name,
+                            format.title);
+    return text;
+}
+
 void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     command
         .add_option(
@@ -253,10 +276,11 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
             "a mesh file, or the steps of a series: mesh files and patterns such as 'run_*.vtu', taken in "
             "the order of the numbers in their names (run_2 before run_10), or one .pvd file")
         ->required();
-    command.add_option(
-        "-o,--output", a.output,
-        "the .vdb file; #### or %04d stands for the step's number in a series, %% for a percent "
-        "sign");
+    command.add_option("-o,--output", a.output,
+                       fileKinds() +
+                           "; - for standard output. #### or %04d stands for the step's number in a series, "
+                           "%% for a percent sign");
+    addFormat(command, a.format, formatNames());
     command.add_option("--times", a.times,
                        "only the steps of a .pvd file with times from a to b, both included: a:b, a: or :b");
     addRefineOptions(command, a);
@@ -274,6 +298,7 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
   tessera resample flow.vtu -o flow.vdb --refine uniform --resolution 256 --layout flat --half
   tessera resample flow.vtu -o flow.vdb --for blender --refine error --max-error 2%
   tessera resample flow.vtu -o flow.vdb --field velocity=v,pressure=density --max-memory 8G --dry-run
+  tessera resample flow.vtu -o flow.vti --field pressure
   tessera resample run_*.vtu -o out_%04d.vdb --json report.json
   tessera resample run.pvd -o 'out_####.vdb' --times 0.5:2)");
 }
@@ -306,7 +331,8 @@ void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
 
 void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
     command.add_option("mesh", arguments.input, "mesh file")->required();
-    command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra")->required();
+    command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra; - for standard output")
+        ->required();
     addTimeStep(command, arguments.timeStep);
     addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
@@ -315,7 +341,7 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
 
 void addPictureOptions(CLI::App& command, PictureArguments& a) {
     command.add_option("vdb", a.input, "a .vdb file that tessera wrote")->required();
-    command.add_option("-o,--output", a.output, "the .png file")->required();
+    command.add_option("-o,--output", a.output, "the .png file; - for standard output")->required();
     command.add_option("--field", a.field, "the field (default: the first)");
     command
         .add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")
@@ -346,8 +372,9 @@ void addSliceOptions(CLI::App& command, SliceArguments& a) {
     command
         .add_option("-o,--output", a.output,
                     "a .exr file (32-bit floats: a channel for every component of every field, and "
-                    "coverage) or a .png file (one field in colours, with a legend)")
+                    "coverage) or a .png file (one field in colours, with a legend); - for standard output")
         ->required();
+    addFormat(command, a.format, {"exr", "png"});
     command
         .add_option("--origin", a.origin,
                     "a point x,y,z of the plane (default: the middle of the mesh's box)")

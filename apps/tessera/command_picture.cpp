@@ -148,9 +148,10 @@ ValueRange shownRange(const ScalarImage& image) {
 int runPicture(const PictureArguments& arguments) {
     checkOutputPaths({arguments.input, arguments.mesh},
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
+    chooseFormat(arguments.output, {}, {"png"});
     if (arguments.mesh.empty())
         refuseReaderBounds(arguments.common.reader, "without --mesh there is none to be read");
-    Session session(arguments.common);
+    Session session(arguments.common, arguments.output);
     checkWritable(arguments.output);
     const VdbFile file = readVdb(arguments.input);
     const OutputField& field = chooseField(file, arguments.field);

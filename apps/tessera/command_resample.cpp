@@ -67,7 +67,7 @@ class ResampleRun {
           repair_(repairOptions(arguments.repair)),
           choice_(chooseResampler(arguments.algorithm.name, settings_.refine.bind)),
           resampler_(*choice_.resampler),
-          session_(arguments.common) {
+          session_(arguments.common, arguments.dryRun ? std::string() : arguments.output) {
         settings_.write.algorithm = resampler_.name();
         if (!choice_.reason.empty()) session_.print(choice_.reason + "\n");
     }
@@ -252,7 +252,7 @@ Json ResampleRun::runStep(const Step& step) {
                 {"algorithm_reason", choice_.reason},
                 {"sample_format", nameOf(settings_.refine.bind.format)},
                 {"criterion", arguments_.refine},
-                {"layout", arguments_.layout},
+                {"layout", settings_.write.layout == VdbLayout::flat ? "flat" : "levels"},
                 {"threads", session_.execution.threadCount()}};
     if (isSeries_) report.update(stepJson(step.source));
     if (!arguments_.program.empty()) report["for"] = arguments_.program;
@@ -334,7 +334,8 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
     options.time = source.time;
     // Where every target gives the same bits, naming one would make the file depend on the processor.
     if (!resampler_.targetsAgree()) options.target = result.target;
-    VdbWriteResult written = writeVdb(step.output, selection.outputs, result, options, session_.execution);
+    VdbWriteResult written =
+        settings_.format->write(step.output, selection.outputs, result, options, session_.execution);
     times.writeMs = timer.elapsedMs();
     return written;
 }

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -26,14 +25,6 @@ namespace {
 
 constexpr std::int64_t kLargestImageBytes = std::int64_t(4) << 30;
 constexpr const char* kCoverageName = "coverage";
-
-bool writesExr(const std::string& path) {
-    std::string extension = std::filesystem::path(path).extension().string();
-    for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
-    if (extension == ".exr") return true;
-    if (extension == ".png") return false;
-    throw InputError(fmt::format("{}: the output is a .exr or a .png file, not '{}'", path, extension));
-}
 
 CutOptions cutOptions(const SliceArguments& a) {
     CutOptions options;
@@ -81,12 +72,12 @@ class SliceRun {
   public:
     explicit SliceRun(const SliceArguments& arguments)
         : arguments_(arguments),
-          exr_(writesExr(arguments.output)),
+          exr_(chooseFormat(arguments.output, arguments.format, {"exr", "png"}) == "exr"),
           cutOptions_(cutOptions(arguments)),
           bind_(bindOptions(arguments.algorithm)),
           choices_(arguments.fields.empty() ? std::vector<FieldChoice>() : parseFields(arguments.fields)),
           choice_(chooseResampler(arguments.algorithm.name, bind_)),
-          session_(arguments.common) {
+          session_(arguments.common, arguments.output) {
         cutOptions_.spillVoxels = choice_.resampler->spillBoundVoxels();
         if (!choice_.reason.empty()) session_.print(choice_.reason + "\n");
     }

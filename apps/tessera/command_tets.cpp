@@ -12,7 +12,8 @@ namespace tessera {
 int runTets(const TetsArguments& arguments) {
     checkOutputPaths({arguments.input},
                      {{"--output", arguments.output}, {"--json", arguments.common.jsonPath}});
-    Session session(arguments.common);
+    chooseFormat(arguments.output, {}, {"vtu"});
+    Session session(arguments.common, arguments.output);
     checkWritable(arguments.output);
     session.progress.declare(
         {{Stage::reading, 1}, {Stage::repairing, arguments.repair.repair ? 1.0 : 0.0}, {Stage::writing, 1}});

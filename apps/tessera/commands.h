@@ -23,7 +23,8 @@ int outputError();
 /// what it says.
 class Session {
   public:
-    explicit Session(const CommonOptions& options);
+    /// @param output what the command writes: for "-" nothing else is printed to standard output.
+    explicit Session(const CommonOptions& options, const std::string& output = {});
     Execution execution;
     ProgressLine progress;
 
@@ -31,7 +32,7 @@ class Session {
     /// the options name. Throws as readMesh does.
     MeshFile readMesh(const std::string& path, const ReadOptions& options);
 
-    /// Prints to standard output, unless quiet or the JSON report goes there.
+    /// Prints to standard output, unless quiet or a file or the JSON report goes there.
     void print(const std::string& text);
 
     /// Prints one line to standard error, unless quiet.
@@ -92,7 +93,7 @@ struct SliceArguments {
     CommonOptions common;
     RepairArguments repair;
     AlgorithmArguments algorithm;
-    std::string input, output, origin, normal = "0,0,1", up, size, fields, range;
+    std::string input, output, format, origin, normal = "0,0,1", up, size, fields, range;
     std::optional<int> component;
     int resolution = 1024;
     int timeStep = -1;

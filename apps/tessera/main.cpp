@@ -105,6 +105,7 @@ int main(int argc, char** argv) {
         return kExitBadInput;
     } catch (const std::bad_alloc&) {
         printError("out of memory");
+    } catch (const tessera::OutputClosed&) {  // whoever reads has seen enough
     } catch (const std::exception& error) {
         printError(error.what());
     }

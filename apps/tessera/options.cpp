@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <set>
 
 #include "base/error.h"
+#include "io/atomic_file.h"
+#include "output_paths.h"
 
 namespace tessera {
 
@@ -109,6 +112,25 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     return r;
 }
 
+const OutputFormat& outputFormat(const ResampleArguments& a) {
+    std::vector<std::string> kinds;
+    for (const OutputFormat& format : outputFormats()) kinds.emplace_back(format.name);
+    // A dry run needs no output.
+    const std::string kind = chooseFormat(a.output.empty() ? kStandardOutput : a.output, a.format, kinds);
+    return *std::find_if(outputFormats().begin(), outputFormats().end(),
+                         [&](const OutputFormat& format) { return kind == format.name; });
+}
+
+VdbLayout chooseLayout(const ResampleArguments& a, const OutputFormat& format) {
+    require(
+        format.holdsLevels || a.layout != "levels",
+        fmt::format("--layout levels: a .{} file ({}) holds one grid a field, at one spacing; a .vdb file "
+                    "holds levels",
+                    format.name, format.title));
+    if (!a.layout.empty()) return a.layout == "flat" ? VdbLayout::flat : VdbLayout::levels;
+    return format.holdsLevels ? VdbLayout::levels : VdbLayout::flat;
+}
+
 }  // namespace
 
 void refuseReaderBounds(const ReaderArguments& a, const std::string& why) {
@@ -139,7 +161,8 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
         require(a.refine == "error", "--error-field needs --refine error");
         for (const FieldChoice& choice : parseFields(a.errorFields)) s.errorFields.push_back(choice.source);
     }
-    s.write.layout = a.layout == "flat" ? VdbLayout::flat : VdbLayout::levels;
+    s.format = &outputFormat(a);
+    s.write.layout = chooseLayout(a, *s.format);
     s.write.halfFloat = a.half;
     s.write.background = float(a.background);
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
@@ -154,6 +177,8 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.write.algorithm = a.algorithm.name;
     s.write.sampleFormat = lossyFormat(s.refine.bind);
     s.write.criterion = a.refine;
+    s.write.maxVoxels = s.refine.maxVoxels;
+    s.format->check(s.write);
     return s;
 }
 

@@ -8,6 +8,7 @@
 
 #include "base/vec.h"
 #include "brick/refine.h"
+#include "io/output_formats.h"
 #include "io/shape_output.h"
 #include "io/vdb_file.h"
 
@@ -55,9 +56,11 @@ struct ResampleArguments {
     CommonOptions common;
     std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
     std::string output, times;        ///< times: "a:b"; empty: all
+    std::string format;  ///< of standard output; empty: the default
     std::string refine = "element-size", errorMeasure = "max";
-    std::string program;         ///< of --for; empty: none
-    std::string layout, upAxis;  ///< empty until settleProgram: not given
+    std::string program;  ///< of --for; empty: none
+    std::string layout;   ///< empty: levels where the output's format can hold them, else flat
+    std::string upAxis;   ///< empty until settleProgram: not given
     std::optional<double> voxelShift;
     AlgorithmArguments algorithm;
     RepairArguments repair;
@@ -78,6 +81,7 @@ struct ResampleArguments {
 /// The same, checked and converted; what depends on the mesh (field indices) is still missing.
 struct ResampleSettings {
     RefineOptions refine;
+    const OutputFormat* format = nullptr;  ///< of the output
     VdbWriteOptions write;
     OutputShape shape;
     std::vector<FieldChoice> fields;       ///< empty: all

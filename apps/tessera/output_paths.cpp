@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
+#include <cctype>
 #include <filesystem>
 #include <map>
 
 #include "base/error.h"
+#include "io/atomic_file.h"
 #include "io/mesh_series.h"
 
 namespace tessera {
@@ -37,7 +39,29 @@ std::string companion(const std::string& path) {
     return {};
 }
 
+/// ".a, .b or .c"
+std::string listEndings(const std::vector<std::string>& kinds) {
+    std::string text;
+    for (std::size_t i = 0; i < kinds.size(); ++i)
+        text += (i == 0 ? "." : i + 1 == kinds.size() ? " or ." : ", .") + kinds[i];
+    return text;
+}
+
 }  // namespace
+
+std::string chooseFormat(const std::string& output, const std::string& format,
+                         const std::vector<std::string>& kinds) {
+    if (output == kStandardOutput) return format.empty() ? kinds.front() : format;
+    if (!format.empty())
+        throw InputError(fmt::format(
+            "--format is for standard output (-o -): the ending of {} says what to write", output));
+    std::string ending = fs::path(output).extension().string();
+    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    for (const std::string& kind : kinds)
+        if (ending == "." + kind) return kind;
+    throw InputError(fmt::format("{}: the ending says what to write: expected {}, got {}", output,
+                                 listEndings(kinds), ending.empty() ? "none" : "'" + ending + "'"));
+}
 
 void checkOutputPaths(const std::vector<std::string>& inputs, const std::vector<OutputPath>& outputs) {
     std::map<std::string, std::string> used;  // what each file is used for
@@ -52,7 +76,14 @@ void checkOutputPaths(const std::vector<std::string>& inputs, const std::vector<
             for (const std::string& file : step.files) useInput(file);
     }
     for (const OutputPath& output : outputs) {
-        if (output.path.empty() || (output.option == "--json" && output.path == "-")) continue;
+        if (output.path.empty()) continue;
+        if (output.path == kStandardOutput) {
+            const auto [before, isFirst] = used.emplace(kStandardOutput, output.option);
+            if (!isFirst)
+                throw InputError(
+                    fmt::format("{} and {} can't both be standard output", before->second, output.option));
+            continue;
+        }
         const auto [before, isNew] =
             used.emplace(fileKey(output.path), fmt::format("the {} file {}", output.option, output.path));
         if (!isNew)

@@ -72,7 +72,6 @@ ResampleArguments settleProgram(ResampleArguments a) {
         if (!a.extendLayers) a.extendLayers = program.extendLayers;
         if (!a.voxelShift) a.voxelShift = program.voxelShift;
     }
-    if (a.layout.empty()) a.layout = "levels";
     if (a.upAxis.empty()) a.upAxis = "keep";
     return a;
 }

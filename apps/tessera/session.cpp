@@ -13,6 +13,7 @@
 #include "base/timer.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "io/atomic_file.h"
 #include "report_text.h"
 #include "series_steps.h"
 #include "terminal.h"
@@ -52,11 +53,11 @@ void noteStart() {
     if (::access(program.c_str(), X_OK) != 0 && name) program = std::filesystem::absolute(name, error);
 }
 
-Session::Session(const CommonOptions& options)
+Session::Session(const CommonOptions& options, const std::string& output)
     : progress(!options.quiet),
       quiet_(options.quiet),
       strict_(options.strict),
-      prints_(!options.quiet && options.jsonPath != "-"),
+      prints_(!options.quiet && options.jsonPath != kStandardOutput && output != kStandardOutput),
       isolated_(options.reader.kind == "isolated") {
     execution.threads = options.threads;
     execution.cancel = &interruptFlag();

@@ -1,6 +1,7 @@
 #include "io/atomic_file.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -8,6 +9,7 @@
 #include <atomic>
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -88,7 +90,31 @@ std::string temporaryName(const fs::path& target, int attempt) {
 
 }  // namespace
 
+void AtomicFile::openNameless() {
+    path_ = "standard output";
+    isStandardOutput_ = true;
+    if (::isatty(STDOUT_FILENO))
+        throw InputError("standard output is a terminal: send it to a file or to another program");
+    const int flags = ::fcntl(STDOUT_FILENO, F_GETFL);
+    if (flags < 0 || (flags & O_ACCMODE) == O_RDONLY) fail(path_, reason(EBADF));
+    std::error_code error;
+    fs::path folder = fs::temp_directory_path(error);
+    if (error) folder = "/tmp";
+    temporaryPath_ = "a temporary file in " + folder.string();
+    descriptor_ = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (descriptor_ >= 0) return;
+    // Not every file system has files without a name.
+    std::string name = (folder / "tessera-XXXXXX").string();
+    descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+    if (descriptor_ < 0) fail(temporaryPath_, reason(errno));
+    ::unlink(name.c_str());
+}
+
 AtomicFile::AtomicFile(const std::string& path) : path_(path) {
+    if (path == kStandardOutput) {
+        openNameless();
+        return;
+    }
     const fs::path target = resolveTarget(path);
     checkTarget(path, target);
     path_ = target.string();
@@ -107,7 +133,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path) {
 AtomicFile::~AtomicFile() {
     if (descriptor_ >= 0) {
         ::close(descriptor_);
-        ::unlink(temporaryPath_.c_str());
+        if (!isStandardOutput_) ::unlink(temporaryPath_.c_str());
     }
     unregisterTemporary(slot_);
 }
@@ -118,7 +144,7 @@ void AtomicFile::writeAt(std::int64_t offset, const void* bytes, std::size_t cou
         const ssize_t written = ::pwrite(descriptor_, next, count, off_t(offset));
         if (written < 0) {
             if (errno == EINTR) continue;
-            fail(path_, reason(errno));
+            fail(isStandardOutput_ ? temporaryPath_ : path_, reason(errno));
         }
         // The disk starts now, which shortens the wait for it in the end.
         if (std::size_t(written) >= kBufferBytes / 2)
@@ -138,8 +164,37 @@ std::size_t AtomicFile::readAt(std::int64_t offset, void* bytes, std::size_t cou
     }
 }
 
-void AtomicFile::commit() {
+void AtomicFile::copyOut(const Execution& execution) const {
+    std::vector<char> bytes(kBufferBytes);
+    for (std::int64_t offset = 0; offset < size_;) {
+        const std::size_t count = readAt(offset, bytes.data(), bytes.size());
+        if (count == 0) throw IoError("can't read " + temporaryPath_ + " back: it ends early");
+        for (std::size_t done = 0; done < count;) {
+            execution.throwIfCancelled();
+            const ssize_t written = ::write(STDOUT_FILENO, bytes.data() + done, count - done);
+            if (written >= 0) {
+                done += std::size_t(written);
+            } else if (errno == EAGAIN) {  // whoever shares the pipe may have set it so
+                pollfd ready{STDOUT_FILENO, POLLOUT, 0};
+                ::poll(&ready, 1, 1000);
+            } else if (errno == EPIPE) {
+                throw OutputClosed("can't write " + path_ + ": " + reason(EPIPE));
+            } else if (errno != EINTR) {
+                fail(path_, reason(errno));
+            }
+        }
+        offset += std::int64_t(count);
+    }
+}
+
+void AtomicFile::commit(const Execution& execution) {
     TESSERA_CHECK(descriptor_ >= 0, "a file is committed once");
+    if (isStandardOutput_) {
+        copyOut(execution);
+        ::close(descriptor_);
+        descriptor_ = -1;
+        return;
+    }
     // Some file systems (network, quota) tell of a full disk only here. Others can't sync at all, which is no
     // failure.
     if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP && errno != EROFS)

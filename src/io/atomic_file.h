@@ -10,13 +10,19 @@
 
 namespace tessera {
 
+/// The name that stands for standard output where a file is written.
+inline constexpr const char* kStandardOutput = "-";
+
 /// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory,
 /// which `commit` syncs and renames; without a commit the destructor removes it and whatever stood at the
 /// name stays as it was.
+///
+/// For kStandardOutput the bytes are gathered in a temporary file without a name, as most formats need to go
+/// back in it, and `commit` copies them out.
 class AtomicFile {
   public:
     /// Throws IoError when the directory is missing or not writable, or `path` names something that isn't a
-    /// regular file.
+    /// regular file; InputError when standard output is a terminal.
     explicit AtomicFile(const std::string& path);
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
@@ -28,15 +34,20 @@ class AtomicFile {
     /// Reads up to `count` bytes back; returns how many there were. Throws IoError.
     std::size_t readAt(std::int64_t offset, void* bytes, std::size_t count) const;
     std::int64_t size() const { return size_; }
-    /// Syncs, closes and renames to the final name. Throws IoError.
-    void commit();
+    /// Syncs, closes and renames to the final name, or copies to standard output. Throws IoError,
+    /// OutputClosed, and while copying Cancelled.
+    void commit(const Execution& execution = {});
 
     const std::string& path() const { return path_; }
     const std::string& temporaryPath() const { return temporaryPath_; }
 
   private:
-    std::string path_;
+    void openNameless();
+    void copyOut(const Execution& execution) const;
+
+    std::string path_;  // for people to read where it is standard output
     std::string temporaryPath_;
+    bool isStandardOutput_ = false;
     int descriptor_ = -1;
     int slot_ = -1;
     std::int64_t size_ = 0;
@@ -63,8 +74,8 @@ class AtomicFileBuffer : public std::streambuf {
     std::int64_t bufferStart_ = 0;  // offset in the file of the buffer's first byte
 };
 
-/// Throws IoError at once when a file could not be written at `path`: missing directory, a directory or
-/// device of this name, no permission. Call it before long work.
+/// Throws at once, as AtomicFile does, when a file could not be written at `path`: missing directory, a
+/// directory or device of this name, no permission. Call it before long work.
 void checkWritable(const std::string& path);
 
 /// Writes a whole small file atomically. Throws IoError.

@@ -79,6 +79,7 @@ RawMesh readRaw(const std::string& path, const ReadOptions& options, const Execu
     }
     if (looksLikeXml(head) && head.find("<VTKFile") != std::string_view::npos)
         return readVtk(path, VtkFormat::xml, options, execution, openOther);
+    if (extension == ".nvdb") throw InputError(path + ": is a NanoVDB file; tessera reads .vdb files");
     throw InputError(path + ": unknown format; known are " + kFormats);
 }
 

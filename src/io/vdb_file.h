@@ -41,6 +41,7 @@ struct VdbWriteOptions {
         0;  ///< the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
+    std::int64_t maxVoxels = 0;        ///< .vti: points that the image may have; 0: kDefaultImagePoints
     std::string algorithm, criterion, sourceFile;
     std::string target;          ///< the device, of algorithms whose results depend on it; else empty
     std::string sampleFormat;    ///< what values were kept in while sampling; empty: 32-bit floats
@@ -50,7 +51,7 @@ struct VdbWriteOptions {
 
 /// What was written.
 struct VdbWriteResult {
-    std::int64_t activeVoxels = 0;  ///< of all grids
+    std::int64_t activeVoxels = 0;  ///< of all grids; of a .vti file the points that a value is stored for
     std::int64_t fileBytes = 0;
     double unitScale = 1;
     std::vector<std::string> notes;  ///< sentences for the user: unit chosen, places rounded
@@ -69,9 +70,10 @@ void roundToHalf(const std::vector<OutputField>& fields, const std::vector<bool>
                  const Execution& execution);
 
 /// Writes the samples and their extension (layout: docs/vdb_layout.md) and frees the store's tiles on the
-/// way. In the flat layout the result comes from `flatten`. Nothing stands at `path` until the file is whole.
-/// Throws IoError (not writable, disk full), InputError (a unit that OpenVDB can't take, clashing names),
-/// Cancelled. The file depends on the arguments only: the same bytes for any number of threads.
+/// way. In the flat layout the result comes from `flatten`. Nothing stands at `path` until the file is whole;
+/// "-" is standard output. Throws IoError (not writable, disk full), InputError (a unit that OpenVDB can't
+/// take, clashing names), Cancelled. The file depends on the arguments only: the same bytes for any number of
+/// threads.
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
                         const VdbWriteOptions& options, const Execution& execution);
 

@@ -231,6 +231,33 @@ std::string exactText(double value) {
     return std::string(text.data(), end);
 }
 
+VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
+                         const VdbWriteOptions& options, double unitScale) {
+    VdbMetadata metadata;
+    metadata.tree = result.bricks ? *result.bricks : result.tree;
+    metadata.fields = fields;
+    metadata.report = result.report;
+    metadata.samplesReport = result.samplesReport;
+    metadata.layout = options.layout;
+    metadata.version = TESSERA_VERSION;
+    metadata.sourceFile = options.sourceFile;
+    metadata.algorithm = options.algorithm;
+    metadata.criterion = options.criterion;
+    metadata.target = options.target;
+    metadata.sampleFormat = options.sampleFormat;
+    metadata.repair = options.repair;
+    metadata.time = options.time;
+    metadata.unitScale = unitScale;
+    metadata.upAxis = options.upAxis;
+    metadata.voxelShift = options.voxelShift;
+    metadata.halfFloat = options.halfFloat;
+    metadata.background = options.background;
+    metadata.boundsWorld = options.boundsWorld;
+    metadata.layers = options.layers;
+    metadata.flatLevel = result.flatLevel;
+    return metadata;
+}
+
 std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     std::map<std::string, std::string> entries;
     entries["tessera_format"] = std::to_string(kVdbFormat);

@@ -31,6 +31,10 @@ double chooseUnitScale(double finestSpacingWorld, double requested);
 /// What the file says of itself. VdbFile without samples and grid list.
 using VdbMetadata = VdbFile;
 
+/// What a file says of some samples that are written to it. @param unitScale file units per world unit.
+VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
+                         const VdbWriteOptions& options, double unitScale);
+
 /// Text entries of the file's metadata, by key.
 std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata);
 /// Throws InputError when an entry is missing or damaged.

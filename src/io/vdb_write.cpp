@@ -14,6 +14,7 @@
 #include "io/file_digest.h"
 #include "io/packed_grid.h"
 #include "io/vdb_metadata.h"
+#include "io/vdb_write.h"
 
 namespace tessera {
 namespace {
@@ -95,12 +96,15 @@ void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
         leaf.getValueMask().template getWord<openvdb::Index64>(w) |= words[w];
 }
 
+// What becomes of the leaf nodes made: the bytes of a file, or a tree in memory.
+enum class LeafForm { packed, plain };
+
 // The grid of one plan at one level, or the coverage mask.
 class GridBuilder {
   public:
     virtual ~GridBuilder() = default;
     virtual void reserve(std::size_t tiles) = 0;
-    // Makes and compresses the leaf node of a tile of a batch; may be called for several at once.
+    // Makes the leaf node of a tile of a batch; may be called for several at once.
     virtual void makeLeaf(std::size_t position, const GridTile& tile) = 0;
     // Puts the leaf nodes made since into the tree.
     virtual void addLeaves() = 0;
@@ -113,8 +117,8 @@ template <class Grid>
 class BuilderOf : public GridBuilder {
   public:
     using Leaf = typename Grid::TreeType::LeafNodeType;
-    BuilderOf(const typename Grid::ValueType& background, bool toHalf)
-        : grid_(std::make_shared<PackedGrid<Grid>>(background)) {
+    BuilderOf(LeafForm form, const typename Grid::ValueType& background, bool toHalf)
+        : form_(form), grid_(std::make_shared<PackedGrid<Grid>>(background)) {
         grid_->setSaveFloatAsHalf(toHalf);
     }
 
@@ -124,32 +128,40 @@ class BuilderOf : public GridBuilder {
         if (tile.samples) fill(leaf, *tile.samples);
         if (tile.extension && isExtended()) fill(leaf, *tile.extension);
         if (leaf.isEmpty()) return;
+        if (form_ == LeafForm::plain) {
+            made_[position] = {std::make_unique<Leaf>(leaf), PackedLeaf()};
+            return;
+        }
         auto maskOnly = std::make_unique<Leaf>(openvdb::PartialCreate(), leaf.origin(), grid_->background());
         maskOnly->setValueMask(leaf.getValueMask());
         made_[position] = {std::move(maskOnly),
                            PackedLeaf(leaf, grid_->background(), grid_->saveFloatAsHalf())};
     }
     void addLeaves() override {
-        for (auto& [maskOnly, bytes] : made_) {
-            if (maskOnly) grid_->add(std::move(maskOnly), std::move(bytes));
+        for (auto& [leaf, bytes] : made_) {
+            if (leaf && form_ == LeafForm::plain) grid_->tree().addLeaf(leaf.release());
+            if (leaf) grid_->add(std::move(leaf), std::move(bytes));
         }
     }
     openvdb::GridBase::Ptr grid() const override { return grid_; }
-    void describe() override { grid_->describe(); }
+    void describe() override {
+        if (form_ == LeafForm::packed) grid_->describe();
+    }
 
   protected:
     virtual void fill(Leaf& leaf, const Tile& tile) const = 0;
     virtual bool isExtended() const { return true; }
 
   private:
+    LeafForm form_;
     std::shared_ptr<PackedGrid<Grid>> grid_;
     std::vector<std::pair<std::unique_ptr<Leaf>, PackedLeaf>> made_;
 };
 
 class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
   public:
-    ScalarBuilder(int channel, float background, bool toHalf)
-        : BuilderOf(background, toHalf), channel_(channel) {}
+    ScalarBuilder(LeafForm form, int channel, float background, bool toHalf)
+        : BuilderOf(form, background, toHalf), channel_(channel) {}
 
   private:
     void fill(FloatLeaf& leaf, const Tile& tile) const override {
@@ -166,8 +178,8 @@ class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
 
 class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
   public:
-    VectorBuilder(int channel, float background, bool toHalf, UpAxis upAxis)
-        : BuilderOf(openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
+    VectorBuilder(LeafForm form, int channel, float background, bool toHalf, UpAxis upAxis)
+        : BuilderOf(form, openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
 
   private:
     void fill(Vec3fLeaf& leaf, const Tile& tile) const override {
@@ -186,7 +198,7 @@ class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
 
 class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
   public:
-    CoverageBuilder() : BuilderOf(false, false) {}
+    explicit CoverageBuilder(LeafForm form) : BuilderOf(form, false, false) {}
 
   private:
     void fill(BoolLeaf& leaf, const Tile& tile) const override {
@@ -202,20 +214,20 @@ struct LevelGrids {
     std::vector<std::unique_ptr<GridBuilder>> builders;  // one a plan, then the coverage
 };
 
-LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf, int level,
-                        const VdbWriteOptions& options) {
+LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf, LeafForm form,
+                        int level, const VdbWriteOptions& options) {
     LevelGrids grids;
     grids.level = level;
     for (std::size_t p = 0; p < plans.size(); ++p) {
         if (plans[p].components == 3) {
             grids.builders.push_back(std::make_unique<VectorBuilder>(
-                plans[p].firstChannel, options.background, toHalf[p], options.upAxis));
+                form, plans[p].firstChannel, options.background, toHalf[p], options.upAxis));
         } else {
             grids.builders.push_back(
-                std::make_unique<ScalarBuilder>(plans[p].firstChannel, options.background, toHalf[p]));
+                std::make_unique<ScalarBuilder>(form, plans[p].firstChannel, options.background, toHalf[p]));
         }
     }
-    grids.builders.push_back(std::make_unique<CoverageBuilder>());
+    grids.builders.push_back(std::make_unique<CoverageBuilder>(form));
     return grids;
 }
 
@@ -280,7 +292,7 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
 }
 
 std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf,
-                                   BrickResult& result, const VdbWriteOptions& options,
+                                   LeafForm form, BrickResult& result, const VdbWriteOptions& options,
                                    const Execution& execution) {
     std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
     for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
@@ -288,10 +300,10 @@ std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std
     std::vector<LevelGrids> all;
     for (int level = 0; level < result.tree.levelCount(); ++level) {
         if (!present[std::size_t(level)]) continue;
-        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, level, options));
+        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, form, level, options));
         addLevel(grids, level, result.tree, result.store, execution);
     }
-    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, 0, options));
+    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, form, 0, options));
     return all;
 }
 
@@ -344,10 +356,10 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
 
 // Grids in the order of the file: field by field, each with its finest level first, then the coverage.
 // `flatLevel` is what the level is called of the bricks that a flat grid was made of.
-openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
-                                 const BrickTree& tree, const VdbWriteOptions& options, double unitScale,
-                                 int flatLevel) {
-    openvdb::GridCPtrVec ordered;
+openvdb::GridPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
+                                const BrickTree& tree, const VdbWriteOptions& options, double unitScale,
+                                int flatLevel) {
+    openvdb::GridPtrVec ordered;
     for (std::size_t p = 0; p <= plans.size(); ++p) {
         const bool coverage = p == plans.size();
         for (const LevelGrids& grids : levels) {
@@ -374,13 +386,13 @@ openvdb::GridCPtrVec finishGrids(const std::vector<LevelGrids>& levels, const st
 class StreamArchive : public openvdb::io::Archive {
   public:
     StreamArchive() { setCompression(kVdbCompression); }
-    void writeTo(std::ostream& stream, const openvdb::GridCPtrVec& grids,
+    void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids,
                  const openvdb::MetaMap& metadata) const {
         writeHeader(stream, true);
         metadata.writeMeta(stream);
         const auto count = openvdb::Int32(grids.size());
         stream.write(reinterpret_cast<const char*>(&count), sizeof count);
-        for (const openvdb::GridBase::ConstPtr& grid : grids) writeGrid(stream, *grid);
+        for (const openvdb::GridBase::Ptr& grid : grids) writeGrid(stream, *grid);
     }
 
   private:
@@ -422,7 +434,7 @@ void stampDigest(AtomicFile& file, const Execution& execution) {
     file.writeAt(kUuidOffset, uuid.data(), uuid.size());
 }
 
-void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids,
+void writeFile(AtomicFile& file, const openvdb::GridPtrVec& grids,
                const std::map<std::string, std::string>& entries, const Execution& execution) {
     openvdb::MetaMap metadata;
     for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
@@ -437,33 +449,6 @@ void writeFile(AtomicFile& file, const openvdb::GridCPtrVec& grids,
         throw IoError("can't write " + file.path() + ": " + error.what());
     }
     stampDigest(file, execution);
-}
-
-VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
-                         const VdbWriteOptions& options, const VdbWriteResult& written) {
-    VdbMetadata metadata;
-    metadata.tree = result.bricks ? *result.bricks : result.tree;
-    metadata.fields = fields;
-    metadata.report = result.report;
-    metadata.samplesReport = result.samplesReport;
-    metadata.layout = options.layout;
-    metadata.version = TESSERA_VERSION;
-    metadata.sourceFile = options.sourceFile;
-    metadata.algorithm = options.algorithm;
-    metadata.criterion = options.criterion;
-    metadata.target = options.target;
-    metadata.sampleFormat = options.sampleFormat;
-    metadata.repair = options.repair;
-    metadata.time = options.time;
-    metadata.unitScale = written.unitScale;
-    metadata.upAxis = options.upAxis;
-    metadata.voxelShift = options.voxelShift;
-    metadata.halfFloat = options.halfFloat;
-    metadata.background = options.background;
-    metadata.boundsWorld = options.boundsWorld;
-    metadata.layers = options.layers;
-    metadata.flatLevel = result.flatLevel;
-    return metadata;
 }
 
 /// How far the file's transform puts the furthest sample from its place, in finest voxels. OpenVDB takes the
@@ -492,7 +477,7 @@ void checkPlace(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteR
     if (error > 0.01)
         result.notes.push_back(far + "the file's transforms are off by up to " +
                                exactText(std::round(100 * error) / 100) +
-                               " voxels; tessera_bricks in the file is exact");
+                               " voxels; tessera_bricks in a .vdb file is exact");
 }
 
 void chooseUnit(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteResult& result) {
@@ -501,9 +486,27 @@ void chooseUnit(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteR
         result.notes.push_back("the finest voxel, " + exactText(tree.spacingWorld(0)) +
                                " units, is smaller than OpenVDB takes: the file's unit is 1/" +
                                exactText(result.unitScale) +
-                               " of the mesh's (see tessera_unit_scale in the file)");
+                               " of the mesh's (tessera_unit_scale in a .vdb file)");
     }
     checkPlace(tree, options, result);
+}
+
+// The grids of a file, in its order; frees the store's tiles.
+openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm form, BrickResult& result,
+                              const VdbWriteOptions& options, VdbWriteResult& written,
+                              const Execution& execution) {
+    checkOutputFields(fields);
+    TESSERA_CHECK((options.layout == VdbLayout::flat) == result.bricks.has_value(),
+                  "a flat grid is made by flatten");
+    chooseUnit(result.tree, options, written);
+    openvdb::initialize();
+    const std::vector<GridPlan> plans = planGrids(fields);
+    for (const GridPlan& plan : plans)
+        TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
+                      "a field's channels are in the store");
+    const std::vector<bool> toHalf = choosePrecision(fields, result.store, options, written);
+    const std::vector<LevelGrids> levels = buildGrids(plans, toHalf, form, result, options, execution);
+    return finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
 }
 
 }  // namespace
@@ -537,27 +540,23 @@ void roundToHalf(const std::vector<OutputField>& fields, const std::vector<bool>
 
 VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>& fields, BrickResult& result,
                         const VdbWriteOptions& options, const Execution& execution) {
-    checkOutputFields(fields);
-    TESSERA_CHECK((options.layout == VdbLayout::flat) == result.bricks.has_value(),
-                  "a flat grid is made by flatten");
     VdbWriteResult written;
-    chooseUnit(result.tree, options, written);
     AtomicFile file(path);
-    openvdb::initialize();
-    const std::vector<GridPlan> plans = planGrids(fields);
-    for (const GridPlan& plan : plans)
-        TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
-                      "a field's channels are in the store");
-    const std::vector<bool> toHalf = choosePrecision(fields, result.store, options, written);
-    const std::vector<LevelGrids> levels = buildGrids(plans, toHalf, result, options, execution);
-    const openvdb::GridCPtrVec grids =
-        finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
-    for (const openvdb::GridBase::ConstPtr& grid : grids)
+    const openvdb::GridPtrVec grids =
+        makeGrids(fields, LeafForm::packed, result, options, written, execution);
+    for (const openvdb::GridBase::Ptr& grid : grids)
         written.activeVoxels += std::int64_t(grid->activeVoxelCount());
-    writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written)), execution);
+    writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written.unitScale)),
+              execution);
     written.fileBytes = file.size();
-    file.commit();
+    file.commit(execution);
     return written;
+}
+
+openvdb::GridPtrVec buildVdbGrids(const std::vector<OutputField>& fields, BrickResult& result,
+                                  const VdbWriteOptions& options, VdbWriteResult& written,
+                                  const Execution& execution) {
+    return makeGrids(fields, LeafForm::plain, result, options, written, execution);
 }
 
 }  // namespace tessera
