@@ -8,6 +8,7 @@
 #include "brick/measure_error.h"
 #include "commands.h"
 #include "import_mesh.h"
+#include "io/mesh_series.h"
 #include "io/outside_reader.h"
 #include "io/vdb_file.h"
 #include "output_paths.h"
@@ -164,6 +165,16 @@ std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, s
     return text;
 }
 
+/// The step that was asked for, or else the step of a .pvd file that has the .vdb file's time.
+int stepOf(const VerifyArguments& arguments, const VdbFile& file) {
+    if (arguments.timeStep >= 0 || !file.time || !isCollectionName(arguments.meshPath))
+        return arguments.timeStep;
+    for (const SeriesStep& step : listSeries(std::span(&arguments.meshPath, 1)))
+        if (step.time == file.time) return int(step.number);
+    throw InputError(fmt::format("{} has no step of time {}, which {} was made from", arguments.meshPath,
+                                 *file.time, arguments.vdbPath));
+}
+
 SampleFormat formatOf(const std::string& name) {
     for (const SampleFormat format : {SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8})
         if (nameOf(format) == name) return format;
@@ -205,7 +216,7 @@ int runVerify(const VerifyArguments& arguments) {
     session.progress.declare({{Stage::reading, 1}, {Stage::measuring, 1}, {Stage::comparing, 1}});
     VdbFile file = readVdb(arguments.vdbPath);
     ReadOptions options;
-    options.timeStep = arguments.timeStep;
+    options.timeStep = stepOf(arguments, file);
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
     Timer timer;
     // The same repair as the file's mesh went through: only then do its claims speak of this mesh.

@@ -29,6 +29,16 @@ bool ascending(const BrickKey& a, const BrickKey& b) {
            std::tie(b.level, b.index.z, b.index.y, b.index.x);
 }
 
+bool fullyCovered(const BrickStore& store, std::size_t leaf) {
+    for (int t = 0; t < store.tileCount(); ++t) {
+        const Tile* tile = store.tile(leaf, t);
+        if (!tile) return false;
+        for (const std::uint64_t word : tile->coverage)
+            if (word != ~std::uint64_t(0)) return false;
+    }
+    return true;
+}
+
 /// The points of a leaf's closed box: which are covered, and which others touched cells need.
 class ClosedBox {
   public:
@@ -38,24 +48,40 @@ class ClosedBox {
           first_(tree.ownedPoints(tree.leaves()[leaf]).min),
           covered_(words(), 0),
           needed_(words(), 0) {
-        const int level = tree.leaves()[leaf].level;
+        const BrickKey& key = tree.leaves()[leaf];
+        const int b = tree.brickCells();
+        // The leaf itself and the next ones, which own the points on the + sides.
+        std::array<std::int64_t, 8> owners;
+        for (int side = 0; side < 8; ++side)
+            owners[std::size_t(side)] = tree.findLeaf({key.level, key.index + cornerOffset(side)});
         const bool coarserNear = hasCoarserNeighbour(tree, leaf);
         for (int x = 0; x < edge_; ++x)
             for (int y = 0; y < edge_; ++y)
                 for (int z = 0; z < edge_; ++z) {
                     const Vec3i local(x, y, z);
-                    const bool own = x + 1 < edge_ && y + 1 < edge_ && z + 1 < edge_;
-                    const bool onLowSide = x == 0 || y == 0 || z == 0;
+                    const Vec3i next(x == b, y == b, z == b);
+                    const std::int64_t owner = owners[std::size_t(next.x | next.y << 1 | next.z << 2)];
+                    const bool onBorder = x == 0 || y == 0 || z == 0 || x == b || y == b || z == b;
                     bool covered = false;
-                    if (own && !(onLowSide && coarserNear))
-                        store.value(leaf, local, 0, covered);
+                    if (owner >= 0 && !(onBorder && coarserNear))
+                        store.value(std::size_t(owner), local - next * b, 0, covered);
                     else
-                        covered = reconstruction.isCovered(level, first_ + local);
+                        covered = reconstruction.isCovered(key.level, first_ + local);
                     if (covered)
                         set(covered_, at(local));
                     else
                         complete_ = false;
                 }
+    }
+    /// Whether all points are covered, told without looking at them; false may mean either.
+    static bool isSurelyComplete(const BrickTree& tree, const std::vector<std::uint8_t>& isFull,
+                                 std::size_t leaf) {
+        const BrickKey& key = tree.leaves()[leaf];
+        for (int side = 0; side < 8; ++side) {
+            const std::int64_t owner = tree.findLeaf({key.level, key.index + cornerOffset(side)});
+            if (owner < 0 || !isFull[std::size_t(owner)]) return false;
+        }
+        return !hasCoarserNeighbour(tree, leaf);
     }
     bool isComplete() const { return complete_; }
 
@@ -146,7 +172,11 @@ class Extender {
     /// What cells that the mesh touches need.
     void markNeeded() {
         boxes_.resize(tree_.leafCount());
+        std::vector<std::uint8_t> isFull(boxes_.size());
+        parallelFor(execution_, std::int64_t(boxes_.size()),
+                    [&](std::int64_t i) { isFull[std::size_t(i)] = fullyCovered(store_, std::size_t(i)); });
         parallelFor(execution_, std::int64_t(boxes_.size()), [&](std::int64_t i) {
+            if (ClosedBox::isSurelyComplete(tree_, isFull, std::size_t(i))) return;
             auto box = std::make_unique<ClosedBox>(tree_, store_, reconstruction_, std::size_t(i));
             if (!box->isComplete()) boxes_[std::size_t(i)] = std::move(box);
         });
@@ -326,16 +356,6 @@ class LayerWindow {
     bool any_ = false;
     std::vector<std::uint8_t> marks_, covered_;
 };
-
-bool fullyCovered(const BrickStore& store, std::size_t leaf) {
-    for (int t = 0; t < store.tileCount(); ++t) {
-        const Tile* tile = store.tile(leaf, t);
-        if (!tile) return false;
-        for (const std::uint64_t word : tile->coverage)
-            if (word != ~std::uint64_t(0)) return false;
-    }
-    return true;
-}
 
 void Extender::markLayers(int layers) {
     const std::vector<BrickKey> targets = targetBricks(tree_);
