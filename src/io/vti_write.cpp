@@ -151,7 +151,7 @@ ImageArray valueArray(const OutputField& field, const PointBox& box, const std::
                       float background) {
     const auto fill = [&box, size, background, first = field.firstChannel, components = field.components](
                           std::int64_t begin, std::int64_t end, char* bytes) {
-        std::vector<float> values(std::size_t(components));
+        std::vector<float> values(static_cast<std::size_t>(components));
         const std::size_t itemBytes = values.size() * sizeof(float);
         forItems(size, begin, end, [&](std::int64_t i, std::int64_t x, std::int64_t y, std::int64_t z) {
             const StoredPoint point = box.at(x, y, z);
