@@ -370,7 +370,7 @@ class Outputs(AppTest):
             report = self.report("resample", self.cube, "-o", f"a.{ending}", *self.COARSE)
             self.assertEqual((report["layout"], report["output"]), ("flat", f"a.{ending}"))
             self.assertGreater(report["write"]["active_voxels"], 9**3)  # with the extension
-            self.assertEqual(report["write"]["bytes"], (self.folder / f"a.{ending}").stat().st_size)
+            self.assertEqual(report["write"]["file_bytes"], (self.folder / f"a.{ending}").stat().st_size)
             self.succeed("resample", self.cube, "-o", f"b.{ending}", "--layout", "flat", *self.COARSE)
             self.assertEqual((self.folder / f"a.{ending}").read_bytes(), (self.folder / f"b.{ending}").read_bytes())
             self.reject(2, f"--layout levels .{ending} .vdb", "resample", self.cube, "-o", f"c.{ending}", "--layout", "levels")

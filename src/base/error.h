@@ -23,12 +23,6 @@ class IoError : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// Whoever read standard output has gone, having seen enough.
-class OutputClosed : public IoError {
-  public:
-    using IoError::IoError;
-};
-
 /// OpenGL is absent or failed.
 class GlError : public std::runtime_error {
   public:

@@ -6,12 +6,19 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "base/execution.h"
 
 namespace tessera {
 
 /// The name that stands for standard output where a file is written.
 inline constexpr const char* kStandardOutput = "-";
+
+/// Whoever read standard output has gone, having seen enough.
+class OutputClosed : public IoError {
+  public:
+    using IoError::IoError;
+};
 
 /// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory,
 /// which `commit` syncs and renames; without a commit the destructor removes it and whatever stood at the

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <limits>
 #include <new>
+#include <string_view>
 #include <unordered_set>
 #include <utility>
 
@@ -41,6 +42,8 @@ bool checkBytes(const std::string& path) {
     stream.read(bytes.data(), std::streamsize(bytes.size()));
     std::size_t got = std::size_t(stream.gcount());
     if (got == 0) refuse(path, "the file is empty, or not a file");
+    if (std::string_view(bytes.data(), got).starts_with("NanoVDB"))
+        refuse(path, "is a NanoVDB file; tessera reads .vdb files");
     if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
         refuse(path, "not a VDB file");
     const std::string uuid(bytes.data() + kUuidOffset, kUuidBytes);
