@@ -48,6 +48,7 @@ def run_program(command):
 
 def run_seed(seed, program, folder, algorithms):
     outcome = Outcome(seed)
+    numpy.seterr(over="ignore", invalid="ignore")  # fields with values near the end of double are drawn too
     begin = time.monotonic()
     rng = numpy.random.default_rng([seed, 2001])
     mesh = make_mesh(rng)
