@@ -32,7 +32,7 @@ from plans.oracle import MeshSamples
 from plans.tamper import check_verify
 from plans.vdb_reader import TesseraFile
 
-MOST_REFUSED = 0.08  # of all seeds
+MOST_REFUSED = 0.1  # of all seeds
 
 
 class Outcome:

@@ -129,7 +129,8 @@ class PlaceChecker:
     def active_within(self, level, points, reconstruction):
         """The grids of a level are active at all points that are kept and have a value."""
         file = self.file
-        points = points[self.kept.keeps(level, points)]
+        if file.bounds:
+            points = points[self.kept.inside(level, points)]
         seen = set()
         for grid, _, _, position in file.channel_grids(level):
             if grid is None or grid.name in seen:
