@@ -32,7 +32,7 @@ from plans.oracle import MeshSamples
 from plans.tamper import check_verify
 from plans.vdb_reader import TesseraFile
 
-MOST_REFUSED = 0.08  # of all seeds
+MOST_REFUSED = 0.1  # of all seeds
 
 
 class Outcome:
@@ -48,6 +48,7 @@ def run_program(command):
 
 def run_seed(seed, program, folder, algorithms):
     outcome = Outcome(seed)
+    numpy.seterr(over="ignore", invalid="ignore")  # fields with values near the end of double are drawn too
     begin = time.monotonic()
     rng = numpy.random.default_rng([seed, 2001])
     mesh = make_mesh(rng)

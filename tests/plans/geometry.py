@@ -92,13 +92,21 @@ class FieldTable:
 
 
 def chunks(counts, most=MOST_PAIRS):
-    """Ranges of items whose counts add up to about `most`."""
+    """Slices of items whose counts add up to about `most`."""
     begin, total = 0, numpy.cumsum(counts)
     while begin < len(counts):
         base = total[begin - 1] if begin else 0
         end = max(begin + 1, int(numpy.searchsorted(total, base + most, "right")))
-        yield begin, end
+        yield slice(begin, end)
         begin = end
+
+
+def repeated(items, counts):
+    """Each item as often as its count says, and the numbers 0, 1, ... within each."""
+    counts = counts[items]
+    starts = numpy.cumsum(counts) - counts
+    item = numpy.repeat(items, counts)
+    return item, numpy.arange(len(item)) - numpy.repeat(starts, counts)
 
 
 class PointIndex:
@@ -112,6 +120,8 @@ class PointIndex:
         self.shape = self.high - self.low + 1
         self.dense = None
         self.points = points
+        self.by_x = numpy.argsort(points[:, 0], kind="stable")
+        self.sorted_x = points[self.by_x, 0]
         if self.shape.astype(float).prod() <= 3e7:
             self.dense = numpy.full(self.shape.prod(), -1, numpy.int32)
             self.dense[self.flat(points)] = numpy.arange(self.count)
@@ -129,19 +139,30 @@ class PointIndex:
         if not self.count or not len(low):
             return
         first = numpy.maximum(numpy.ceil(low), self.low).astype(numpy.int64)
-        size = numpy.maximum(numpy.minimum(numpy.floor(high), self.high).astype(numpy.int64) - first + 1, 0)
-        counts = size.prod(axis=1)
-        boxes = numpy.flatnonzero(counts)
-        for begin, end in chunks(counts[boxes]):
-            part = boxes[begin:end]
-            box = numpy.repeat(part, counts[part])
-            starts = numpy.cumsum(counts[part]) - counts[part]
-            k = numpy.arange(len(box)) - numpy.repeat(starts, counts[part])
-            yz = size[box, 1] * size[box, 2]
+        last = numpy.minimum(numpy.floor(high), self.high).astype(numpy.int64)
+        counts = numpy.maximum(last - first + 1, 0).prod(axis=1)
+        # Either all lattice points of a box are looked up, or the points that are asked for with an x in its range, whichever are fewer.
+        begin = numpy.searchsorted(self.sorted_x, first[:, 0])
+        in_range = numpy.searchsorted(self.sorted_x, last[:, 0], "right") - begin
+        few = in_range < counts
+        yield from self.look_up(numpy.flatnonzero((counts > 0) & ~few), counts, first, last)
+        boxes = numpy.flatnonzero((counts > 0) & few & (in_range > 0))
+        for part in chunks(in_range[boxes]):
+            box, k = repeated(boxes[part], in_range)
+            point = self.by_x[begin[box] + k]
+            place = self.points[point]
+            hit = ((place[:, 1:] >= first[box, 1:]) & (place[:, 1:] <= last[box, 1:])).all(axis=1)
+            yield box[hit], point[hit]
+
+    def look_up(self, boxes, counts, first, last):
+        for part in chunks(counts[boxes]):
+            box, k = repeated(boxes[part], counts)
+            size = last[box, 1:] - first[box, 1:] + 1
             place = first[box]
-            place[:, 0] += k // yz
-            place[:, 1] += k % yz // size[box, 2]
-            place[:, 2] += k % size[box, 2]
+            place[:, 2] += k % size[:, 1]
+            k //= size[:, 1]
+            place[:, 1] += k % size[:, 0]
+            place[:, 0] += k // size[:, 0]
             keys = self.flat(place)
             if self.dense is not None:
                 point = self.dense[keys]

@@ -79,7 +79,7 @@ def draw_options(rng, mesh, algorithms):
         features.add(f"bounds {kind}")
     if refine != "uniform":
         # Small enough that error refinement ends early and flat grids are capped now and then.
-        use("--max-voxels", int(10.0 ** rng.uniform(4.9, 5.5)) * (2 if brick_size == 16 else 1))
+        use("--max-voxels", int(10.0 ** rng.uniform(4.9, 5.5)) * (3 if brick_size == 16 else 1) * (2 if "--spacing" in arguments else 1))
     elif rng.random() < 0.2:
         use("--max-voxels", int(10.0 ** rng.uniform(4.5, 5.3)))
     if rng.random() < 0.25:

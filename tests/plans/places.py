@@ -4,7 +4,7 @@ import numpy
 
 from plans.findings import some
 from plans.geometry import Values, float_ulp
-from plans.oracle import ON_PLANE, Reconstruction
+from plans.oracle import ON_PLANE, Reconstruction, keys_of
 from plans.vdb_reader import FileSamples
 
 
@@ -23,6 +23,15 @@ def snap(fraction):
     return numpy.where(fraction < ON_PLANE, 0.0, numpy.where(fraction > 1 - ON_PLANE, 1.0, fraction))
 
 
+def grown(points, first, last):
+    """All points within `first` to `last` steps along every axis of some points, each once."""
+    for axis in range(3):
+        step = numpy.arange(3) == axis
+        points = numpy.concatenate([points + i * step for i in range(first, last + 1)])
+        points = points[numpy.unique(keys_of(points), return_index=True)[1]]
+    return points
+
+
 class PlaceChecker:
     def __init__(self, mesh, mesh_samples, file, oracle, kept, findings):
         self.mesh, self.samples, self.file, self.oracle, self.kept, self.findings = mesh, mesh_samples, file, oracle, kept, findings
@@ -39,7 +48,9 @@ class PlaceChecker:
         self.read(reader, more[more_inside], numpy.ones(more_inside.sum(), bool))
         self.missing(reader)
         if self.file.extend and self.file.layout == "flat":
-            self.layers(numpy.concatenate([self.places[inside], more[more_inside]]))
+            self.flat_layers(numpy.concatenate([self.places[inside], more[more_inside]]))
+        elif self.file.extend:
+            self.level_layers()
         self.figures(self.file.report, got, inside, sure, "file")
         self.sample_report(inside, sure)
 
@@ -97,26 +108,36 @@ class PlaceChecker:
             points = numpy.unique(numpy.concatenate(points), axis=0)
             self.findings.problem("missing voxels", f"{name}: places in the mesh need {len(points)} voxels that aren't active: {some(points)}")
 
-    def layers(self, places):
+    def flat_layers(self, places):
         """Flat: n - 1 layers more around the corners of the cells that the mesh touches (here: those with one of these places well inside)."""
         file, level = self.file, self.file.flat_level
         index = (places - file.tree.origin) / file.tree.level_spacing(level)
         cell = numpy.floor(index)
         inside = ((index - cell > 1e-6) & (index - cell < 1 - 1e-6)).all(axis=1)
-        cells = numpy.unique(cell[inside].astype(numpy.int64), axis=0)
-        if not len(cells):
-            return
-        steps = numpy.arange(-(file.extend - 1), file.extend + 1)
-        around = numpy.stack(numpy.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-        points = numpy.unique((cells[:, None, :] + around).reshape(-1, 3), axis=0)
-        points = points[self.kept.keeps(level, points)]
+        self.active_within(level, grown(cell[inside].astype(numpy.int64), -(file.extend - 1), file.extend), self.oracle)
+
+    def level_layers(self):
+        """Levels: n layers around the covered points of a level, but for what bricks of other levels own."""
+        file = self.file
+        for level in file.levels():
+            coverage = file.grid("coverage", level)
+            if coverage is not None:
+                points = grown(coverage.points, -file.extend, file.extend)
+                owner = file.tree.owner(level, points)
+                self.active_within(level, points[(owner < 0) | (owner == level)], None)
+
+    def active_within(self, level, points, reconstruction):
+        """The grids of a level are active at all points that are kept and have a value."""
+        file = self.file
+        if file.bounds:
+            points = points[self.kept.inside(level, points)]
         seen = set()
         for grid, _, _, position in file.channel_grids(level):
             if grid is None or grid.name in seen:
                 continue
             seen.add(grid.name)
             absent = points[grid.find(points) < 0]
-            expected = self.oracle.at(level, absent)
+            expected = reconstruction.at(level, absent) if reconstruction else self.samples.sample(level, absent)
             wanted = absent[expected.finite[:, position] & ~expected.broken[:, position]]
             self.findings.count("voxels of layers", len(points))
             if len(wanted):
