@@ -15,6 +15,7 @@ import os
 import pathlib
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -129,6 +130,33 @@ def summarise(outcomes):
     print("largest error over allowance: " + ", ".join(f"{n} {v:.3g} (seed {s})" for n, (v, s) in sorted(ratios.items())))
 
 
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+
+def run_all(options, base):
+    """Outcomes of the seeds, and whether a signal ended it before all had run."""
+    outcomes = []
+    signal.signal(signal.SIGTERM, interrupt)
+    with concurrent.futures.ProcessPoolExecutor(options.jobs, initializer=signal.signal, initargs=(signal.SIGTERM, signal.SIG_DFL)) as pool:
+        algorithms = options.algorithms.split(",")
+        runs = [pool.submit(run_seed, seed, options.tessera, base / f"seed_{seed}", algorithms) for seed in options.seeds]
+        try:
+            for run in concurrent.futures.as_completed(runs):
+                outcome = run.result()
+                outcomes.append(outcome)
+                if outcome.problems:
+                    print(f"\nseed {outcome.seed} ({outcome.seconds:.1f} s): {outcome.command}")
+                    for problem in outcome.problems:
+                        print("    " + problem.replace("\n", "\n    "))
+                    sys.stdout.flush()
+                else:
+                    shutil.rmtree(base / f"seed_{outcome.seed}", ignore_errors=True)
+        except KeyboardInterrupt:
+            pool.shutdown(cancel_futures=True)
+    return outcomes, len(outcomes) < len(options.seeds)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tessera", required=True)
@@ -138,26 +166,14 @@ def main():
     parser.add_argument("--algorithms", default="software")
     options = parser.parse_args()
     base = options.keep or pathlib.Path(tempfile.mkdtemp(prefix="tessera-plans-"))
-    outcomes = []
     begin = time.monotonic()
     try:
-        with concurrent.futures.ProcessPoolExecutor(options.jobs) as pool:
-            runs = [
-                pool.submit(run_seed, seed, options.tessera, base / f"seed_{seed}", options.algorithms.split(",")) for seed in options.seeds
-            ]
-            for run in concurrent.futures.as_completed(runs):
-                outcome = run.result()
-                outcomes.append(outcome)
-                if outcome.problems:
-                    print(f"\nseed {outcome.seed} ({outcome.seconds:.1f} s): {outcome.command}")
-                    for problem in outcome.problems:
-                        print("    " + problem.replace("\n", "\n    "))
-                    sys.stdout.flush()
-                elif options.keep:
-                    shutil.rmtree(base / f"seed_{outcome.seed}", ignore_errors=True)
+        outcomes, ended_early = run_all(options, base)
     finally:
         if not options.keep:
             shutil.rmtree(base, ignore_errors=True)
+    if not outcomes:
+        return 1
     refused = [o for o in outcomes if o.refused]
     failed = sorted(o.seed for o in outcomes if o.problems)
     print()
@@ -172,7 +188,9 @@ def main():
         f"{len(outcomes)} seeds, {len(refused)} refused, {len(failed)} failed {failed or ''} "
         f"in {time.monotonic() - begin:.0f} s (slowest: seed {slowest.seed}, {slowest.seconds:.1f} s)"
     )
-    return 1 if failed or too_many else 0
+    if ended_early:
+        print(f"ended early: {len(options.seeds) - len(outcomes)} seeds have not run")
+    return 1 if failed or too_many or ended_early else 0
 
 
 if __name__ == "__main__":
