@@ -739,11 +739,12 @@ class Reports(AppTest):
         self.assertTrue(self.report("verify", self.cube, "out.vdb")["holds"])
 
     def test_verify_confirms_the_file(self):
-        for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"]):
+        for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"], ["--layout", "flat"]):
             self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", *options)
             report = self.report("verify", self.stokes, "out.vdb")
             self.assertTrue(report["holds"])
-            self.assertGreater(report["samples"]["covered"], 100)
+            self.assertGreater(report["voxels"]["covered"], 100)
+            self.assertEqual(report["voxels"]["incomplete_places"], 0)
 
     def test_verify_denies_a_file_of_another_field(self):
         self.write("other.vtu", vtu_text(fields={"f": [3 * p[0] for p in CUBE_POINTS]}))
@@ -792,7 +793,7 @@ class Reports(AppTest):
         self.assertAlmostEqual(flat["bytes"] / flat["voxels"], levels["bytes"] / levels["voxels"], places=3)
         report = self.coarser_report("resample", self.stokes, "-o", "out.vdb", "--layout", "flat")
         self.assertEqual(report["write"]["flat_level"], flat["level"])
-        notes = [note for note in report["write"]["notes"] if "the flat grid has spacing" in note]
+        notes = [note for note in report["notes"] if "the flat grid has spacing" in note]
         self.assertEqual(len(notes), 1)
         self.assertIn("--max-voxels", notes[0])
         self.assertIn(notes[0], dry["notes"])
@@ -1150,7 +1151,7 @@ class Series(AppTest):
         self.assertEqual(self.report("info", "all.pvd")["series"]["times"], [0, 1, 2])
         text = self.succeed("info", "all.pvd")
         self.assertRegex(text, r"step +time +cells +elements +nodes +files\n +0 +0 +6 +6 +8 +run_0.vtu\n")
-        self.assertRegex(text, r"f +points +1 +0 .. 18")
+        self.assertRegex(text, r"f +points +1 +0 +18")
         self.write("run_3.vtu", vtu_text(fields={"g": [0] * 8}))
         self.assertIn("field 'f' is in 3 of 4 steps only", self.succeed("info", "run_*.vtu"))
         self.reject(2, "vdb", "info", "a.vdb", "b.vdb")

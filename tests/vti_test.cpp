@@ -112,20 +112,20 @@ TEST_F(VtiTest, VtkReadsEveryPoint) {
 
 TEST_F(VtiTest, TheImageIsTheBoxOfTheVoxels) {
     BrickResult result = flatResult(
-        1, valueAt, [](int, const Vec3i& p) { return p == Vec3i(-9, 3, 4) || p == Vec3i(2, 5, 4); });
+        1, valueAt, [](int, const Vec3i& p) { return p == Vec3i(-9, 3, 4) || p == Vec3i(2, -5, 4); });
     result.store.extension().clear();
     VdbWriteOptions options = flatOptions();
     options.unitScale = 1000;
     writeVti(file("out.vti"), kScalar, result, options, {});
     vtkImageData* image = read("out.vti");
     EXPECT_EQ(image->GetDimensions()[0], 12);
-    EXPECT_EQ(image->GetDimensions()[1], 3);
+    EXPECT_EQ(image->GetDimensions()[1], 9);
     EXPECT_EQ(image->GetDimensions()[2], 1);
     EXPECT_EQ(image->GetOrigin()[0], -9 * kFlatSpacing * 1000);
     EXPECT_EQ(image->GetOrigin()[2], 4 * kFlatSpacing * 1000);
     EXPECT_EQ(image->GetSpacing()[2], kFlatSpacing * 1000);
-    EXPECT_EQ(image->GetNumberOfCells(), 11 * 2);
-    EXPECT_EQ(image->GetPointData()->GetArray("f")->GetTuple1(0), double(valueAt(0, {-9, 3, 4}, 0)));
+    EXPECT_EQ(image->GetNumberOfCells(), 11 * 8);
+    EXPECT_EQ(image->GetPointData()->GetArray("f")->GetTuple1(8 * 12), double(valueAt(0, {-9, 3, 4}, 0)));
 }
 
 // VTK tells cells beside a hidden point apart by flags that are written too.

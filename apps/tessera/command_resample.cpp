@@ -386,6 +386,7 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
                               {"stopped_because", result.stoppedBecause},
                               {"rounds", result.rounds}};
     json["notes"] = result.notes;
+    if (!flat.empty()) json["notes"].push_back(flat);
     json["target"] = result.target;
     json["statistics"] = statisticsJson(result.statistics);
     json["write"] = writeResultJson(written, result.flatLevel);
