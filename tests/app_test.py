@@ -739,7 +739,8 @@ class Reports(AppTest):
         self.assertTrue(self.report("verify", self.cube, "out.vdb")["holds"])
 
     def test_verify_confirms_the_file(self):
-        for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"], ["--layout", "flat"]):
+        for options in ([], ["--half"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"], ["--extend", "2"],
+                        ["--refine", "uniform", "--resolution", "60", "--layout", "flat"]):
             self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", *options)
             report = self.report("verify", self.stokes, "out.vdb")
             self.assertTrue(report["holds"])

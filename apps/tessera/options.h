@@ -56,7 +56,7 @@ struct ResampleArguments {
     CommonOptions common;
     std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
     std::string output, times;        ///< times: "a:b"; empty: all
-    std::string format;  ///< of standard output; empty: the default
+    std::string format;               ///< of standard output; empty: the default
     std::string refine = "element-size", errorMeasure = "max";
     std::string program;  ///< of --for; empty: none
     std::string layout;   ///< empty: levels where the output's format can hold them, else flat

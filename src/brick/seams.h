@@ -100,8 +100,8 @@ class Reconstruction {
     /// the leaf that owns it, or of the last level looked at when none does.
     using VisitOutside = std::function<void(int level, const Vec3i& p)>;
     void visitOutside(int level, const Vec3i& p, const VisitOutside& visit) const;
-    /// All channels at the mesh point nearest to lattice point `p`; NaN where a value isn't finite as a float,
-    /// and for a mesh without elements.
+    /// All channels at the mesh point nearest to lattice point `p`; NaN where a value isn't finite as a
+    /// float, and for a mesh without elements.
     void nearestValues(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;
     /// Trilinear value at a place inside a leaf's closed box, in index space of the leaf's level. @param
     /// coveredCorners receives how many of the cell's corners are in the mesh, when not null (corners of
