@@ -126,7 +126,7 @@ std::vector<Comparison> compareReading(const TetMesh& mesh, std::span<const int>
     return rows;
 }
 
-Json voxelsJson(const VoxelCheck& check, const OutsideReading& reading, std::int64_t strayValues) {
+Json voxelsJson(const VoxelCheck& check, const OutsideReading& reading, const VdbFile& file) {
     const PointCheck& s = check.samples;
     return {{"covered", s.covered},
             {"holes", s.holes},
@@ -138,12 +138,13 @@ Json voxelsJson(const VoxelCheck& check, const OutsideReading& reading, std::int
             {"wrong_derived", check.wrongDerived},
             {"missing_extension", check.missingDerived},
             {"unexpected_extension", check.unexpected},
-            {"inactive_not_background", strayValues},
+            {"inactive_not_background", file.strayValues},
+            {"grid_problems", file.gridProblems},
             {"read_places", reading.places},
             {"incomplete_places", reading.incomplete}};
 }
 
-std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, std::int64_t strayValues) {
+std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, const VdbFile& file) {
     const PointCheck& s = check.samples;
     std::string text = fmt::format(
         "  every voxel against the mesh: {} in the mesh; {} holes, {} spills, {} wrong values\n",
@@ -155,8 +156,10 @@ std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, s
         text += fmt::format("  interpolated or outside the mesh: {}; {} wrong, {} missing, {} unexpected\n",
                             formatCount(check.derived), formatCount(check.wrongDerived),
                             formatCount(check.missingDerived), formatCount(check.unexpected));
-    if (strayValues > 0)
-        text += fmt::format("  {} inactive voxels don't hold the background\n", formatCount(strayValues));
+    if (file.strayValues > 0)
+        text +=
+            fmt::format("  {} inactive voxels don't hold the background\n", formatCount(file.strayValues));
+    for (const std::string& problem : file.gridProblems) text += "  " + problem + "\n";
     text +=
         fmt::format("  read by OpenVDB's sampler: {} nodes and centroids, {} of them beside absent voxels\n",
                     formatCount(reading.places), formatCount(reading.incomplete));
@@ -243,11 +246,12 @@ int runVerify(const VerifyArguments& arguments) {
     rows.insert(rows.end(), read.begin(), read.end());
     times.verifyMs = timer.elapsedMs();
     const bool holds = voxels.isGood() && reading.incomplete == 0 && file.strayValues == 0 &&
+                       file.gridProblems.empty() &&
                        std::all_of(rows.begin(), rows.end(), [](const Comparison& r) { return r.holds(); });
 
     showRepair(arguments.meshPath, imported, repair, session);
     session.print(fmt::format("{} against {}\n", arguments.vdbPath, arguments.meshPath) +
-                  comparisonText(rows) + errorText(measured) + voxelsText(voxels, reading, file.strayValues) +
+                  comparisonText(rows) + errorText(measured) + voxelsText(voxels, reading, file) +
                   (holds ? "verified: the file's claims hold\n" : ""));
     if (!arguments.common.jsonPath.empty()) {
         Json json{{"schema", 1},
@@ -258,7 +262,7 @@ int runVerify(const VerifyArguments& arguments) {
                   {"vdb_file", arguments.vdbPath},
                   {"holds", holds},
                   {"comparison", comparisonJson(rows)},
-                  {"voxels", voxelsJson(voxels, reading, file.strayValues)},
+                  {"voxels", voxelsJson(voxels, reading, file)},
                   {"coverage", coverageJson(measured)},
                   {"error", errorJson(measured)},
                   {"stages", stagesJson(times)}};

@@ -204,6 +204,7 @@ BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Ex
     BrickTree tree = options.criterion == Criterion::uniform
                          ? planUniform(mesh, meshBox, options, maxLeaves, execution)
                          : planByElementSize(mesh, meshBox, options, maxLeaves, execution, notes);
+    if (tree.leafCount() == 0) throw InputError("the bounds do not meet the mesh");
     execution.report(Stage::planning, 1, 1);
     return tree;
 }

@@ -123,6 +123,7 @@ class ErrorRefinement {
         budgetLeaves_ = leafBudget(options, samples_.channels());
         if (options.maxVoxels == 0 && options.maxMemoryBytes == 0)
             budgetLeaves_ = std::min(budgetLeaves_, std::size_t(kDefaultErrorVoxels / brickPoints()));
+        if (plan_.leafCount() == 0) throw InputError("the bounds do not meet the mesh");
         if (plan_.leafCount() > budgetLeaves_)
             throw InputError(
                 "the coarsest plan has " + std::to_string(std::int64_t(plan_.leafCount()) * brickPoints()) +

@@ -99,8 +99,9 @@ struct VdbFile {
     float background = 0;
     int flatLevel = 0;  ///< flat: of `bricks`, the level whose spacing the grids have
     std::vector<std::string> gridNames;
-    std::vector<std::int64_t> gridVoxels;  ///< active voxels, one a grid
-    std::int64_t strayValues = 0;          ///< inactive voxels that hold something else than the background
+    std::vector<std::int64_t> gridVoxels;   ///< active voxels, one a grid
+    std::int64_t strayValues = 0;           ///< inactive voxels that hold something else than the background
+    std::vector<std::string> gridProblems;  ///< sentences: grids whose place or background aren't the file's
 };
 
 /// Throws InputError when the file is missing, damaged, no VDB file, or not written by Tessera

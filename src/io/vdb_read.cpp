@@ -260,9 +260,44 @@ void readExtension(const Grid& grid, int level, VdbFile& file, const Put& put) {
     }
 }
 
+openvdb::Vec3d turned(const Vec3d& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return {v.x, v.z, -v.y};
+    if (upAxis == UpAxis::z) return {v.x, -v.z, v.y};
+    return {v.x, v.y, v.z};
+}
+
+// Notes a grid that stands elsewhere than the description says, or has another background.
+void checkFrame(const openvdb::GridBase& grid, int level, VdbFile& file) {
+    const double h = file.tree.spacingWorld(level) * file.unitScale;
+    const Vec3d origin = file.tree.originWorld() * file.unitScale + file.voxelShift * h;
+    const double far = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
+    // Steps are differences of places, so they carry the rounding of the origin.
+    const double slack = 1e-9 * h + 1e-15 * (far + h);
+    const openvdb::Vec3d first = grid.transform().indexToWorld(openvdb::Vec3d(0.0));
+    bool fits = (first - turned(origin, file.upAxis)).length() <= slack;
+    for (int axis = 0; axis < 3; ++axis) {
+        Vec3d step(0);
+        step[axis] = 1;
+        const openvdb::Vec3d index(step.x, step.y, step.z);
+        const openvdb::Vec3d found = grid.transform().indexToWorld(index) - first;
+        fits = fits && (found - turned(step * h, file.upAxis)).length() <= slack;
+    }
+    if (!fits)
+        file.gridProblems.push_back("grid " + grid.getName() +
+                                    " stands elsewhere than the file's description says");
+}
+
+void checkBackground(double found, const openvdb::GridBase& grid, VdbFile& file) {
+    const double expected = double(file.background);
+    const double rounding = grid.saveFloatAsHalf() ? 0x1p-10 * std::abs(expected) + 0x1p-24 : 0;
+    if (!(std::abs(found - expected) <= rounding))
+        file.gridProblems.push_back("grid " + grid.getName() + " has another background than the file says");
+}
+
 void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
-    readCoverage(*readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", file.layout, level)), level,
-                 file);
+    const auto coverage = readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", file.layout, level));
+    checkFrame(*coverage, level, file);
+    readCoverage(*coverage, level, file);
     constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
     for (const GridPlan& plan : planGrids(file.fields)) {
         const std::string name = gridName(plan.name, file.layout, level);
@@ -271,6 +306,8 @@ void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
         };
         if (plan.components == 3) {
             const auto grid = readTypedGrid<openvdb::Vec3SGrid>(source, name);
+            checkFrame(*grid, level, file);
+            for (int c = 0; c < 3; ++c) checkBackground(double(grid->background()[c]), *grid, file);
             const auto put = [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
                 const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
                 for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
@@ -279,6 +316,8 @@ void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
             readExtension(*grid, level, file, put);
         } else {
             const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
+            checkFrame(*grid, level, file);
+            checkBackground(double(grid->background()), *grid, file);
             const auto put = [&](Tile& tile, int offset, bool valid, float value) {
                 at(tile, 0, offset) = valid ? value : kInvalid;
             };
