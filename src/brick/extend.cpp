@@ -331,19 +331,15 @@ class LayerWindow {
     }
     /// Marks every point within `steps` (26 neighbours) of a marked one: three passes, one an axis.
     void grow(int steps) {
-        for (int axis = 0; axis < 3 && steps > 0; ++axis) {
-            const std::vector<std::uint8_t> before = marks_;
-            Vec3i step(0);
-            step[axis] = 1;
-            for (int z = 0; z < edge_; ++z)
-                for (int y = 0; y < edge_; ++y)
-                    for (int x = 0; x < edge_; ++x) {
-                        const Vec3i p(x, y, z);
-                        if (!before[at(p)]) continue;
-                        for (int d = -steps; d <= steps; ++d)
-                            if (p[axis] + d >= 0 && p[axis] + d < edge_) marks_[at(p + step * d)] = 1;
-                    }
-        }
+        if (steps <= 0) return;
+        const std::size_t edge = std::size_t(edge_);
+        const std::array<std::size_t, 3> stride{1, edge, edge * edge};
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            for (std::size_t a = 0; a < edge; ++a)
+                for (std::size_t b = 0; b < edge; ++b) {
+                    const std::size_t first = a * stride[(axis + 1) % 3] + b * stride[(axis + 2) % 3];
+                    growLine(first, stride[axis], steps);
+                }
     }
 
   private:
@@ -352,9 +348,26 @@ class LayerWindow {
                std::size_t(p.x);
     }
 
+    // Forwards by the distance to the last mark, then backwards to the next one.
+    void growLine(std::size_t first, std::size_t stride, int steps) {
+        line_.resize(std::size_t(edge_));
+        int distance = steps;
+        for (int i = 0; i < edge_; ++i) {
+            const std::uint8_t mark = marks_[first + std::size_t(i) * stride];
+            line_[std::size_t(i)] = mark;
+            distance = mark ? 0 : distance + 1;
+            if (distance <= steps) marks_[first + std::size_t(i) * stride] = 1;
+        }
+        distance = steps;
+        for (int i = edge_ - 1; i >= 0; --i) {
+            distance = line_[std::size_t(i)] ? 0 : distance + 1;
+            if (distance <= steps) marks_[first + std::size_t(i) * stride] = 1;
+        }
+    }
+
     int layers_, brickCells_, edge_;
     bool any_ = false;
-    std::vector<std::uint8_t> marks_, covered_;
+    std::vector<std::uint8_t> marks_, covered_, line_;
 };
 
 void Extender::markLayers(int layers) {

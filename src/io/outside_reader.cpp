@@ -84,6 +84,7 @@ class OutsideReader {
             reading.max.push_back(std::sqrt(largest));
             ++f;
         }
+        reading.incomplete = std::count(incomplete_.begin(), incomplete_.end(), std::uint8_t(1));
         return reading;
     }
 
@@ -95,6 +96,7 @@ class OutsideReader {
         for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf)
             coarserNear[leaf] = hasCoarserNeighbour(tree, leaf);
         level_.assign(samples_.count(), -1);
+        incomplete_.assign(samples_.count(), 0);
         parallelForChunks(execution_, std::int64_t(samples_.count()), kChunk,
                           [&](std::int64_t begin, std::int64_t end) {
                               for (std::int64_t i = begin; i < end; ++i)
@@ -146,8 +148,8 @@ class OutsideReader {
                     if (!isComplete(accessor, index)) {
                         squares_[i] = -1;
                         if (!isFinite) continue;
+                        incomplete_[i] = 1;
                         const std::lock_guard lock(mutex);
-                        ++reading.incomplete;
                         if (reading.firstProblem.empty())
                             reading.firstProblem = "the place (" + exactText(world.x) + ", " +
                                                    exactText(world.y) + ", " + exactText(world.z) +
@@ -183,8 +185,9 @@ class OutsideReader {
     const VdbFile& file_;
     SampledMesh samples_;
     const Execution& execution_;
-    std::vector<std::int32_t> level_;  // by sample: the level whose grid it is read from, or -1
-    std::vector<double> squares_;      // by sample: of the differences of one field; below 0 where not finite
+    std::vector<std::int32_t> level_;       // by sample: the level whose grid it is read from, or -1
+    std::vector<std::uint8_t> incomplete_;  // by sample: it lacks a voxel in some grid
+    std::vector<double> squares_;  // by sample: of the differences of one field; below 0 where not finite
 };
 
 }  // namespace
