@@ -449,6 +449,8 @@ class Outputs(AppTest):
         self.assertEqual(process.stdout.read(4), b" BDV")  # and then nothing more of the megabytes that follow
         process.send_signal(signal.SIGTERM)
         self.assertEqual(process.wait(timeout=60), 143)
+        process.stdout.close()
+        process.stderr.close()
 
     def test_nanovdb_files_are_not_read(self):
         self.succeed("resample", self.cube, "-o", "a.nvdb", *self.COARSE)

@@ -66,7 +66,7 @@ Expected expectedAt(const BrickResult& result, const Vec3i& p) {
 TEST_F(VtiTest, VtkReadsEveryPoint) {
     BrickResult result = flatResult(10);
     VdbWriteOptions options = flatOptions();
-    options.background = -3;
+    options.hiddenValue = -3;
     options.time = 2.5;
     options.sourceFile = "mesh.vtu";
     const VdbWriteResult written = writeVti(file("out.vti"), kMixed, result, options, {});
@@ -110,7 +110,7 @@ TEST_F(VtiTest, VtkReadsEveryPoint) {
     EXPECT_EQ(entries->GetArray("TimeValue")->GetTuple1(0), 2.5);
 }
 
-TEST_F(VtiTest, TheImageIsTheBoxOfTheVoxels) {
+TEST_F(VtiTest, TheImageIsTheBoxOfTheVoxelsAndALayer) {
     BrickResult result = flatResult(
         1, valueAt, [](int, const Vec3i& p) { return p == Vec3i(-9, 3, 4) || p == Vec3i(2, -5, 4); });
     result.store.extension().clear();
@@ -118,14 +118,48 @@ TEST_F(VtiTest, TheImageIsTheBoxOfTheVoxels) {
     options.unitScale = 1000;
     writeVti(file("out.vti"), kScalar, result, options, {});
     vtkImageData* image = read("out.vti");
-    EXPECT_EQ(image->GetDimensions()[0], 12);
-    EXPECT_EQ(image->GetDimensions()[1], 9);
-    EXPECT_EQ(image->GetDimensions()[2], 1);
-    EXPECT_EQ(image->GetOrigin()[0], -9 * kFlatSpacing * 1000);
-    EXPECT_EQ(image->GetOrigin()[2], 4 * kFlatSpacing * 1000);
+    EXPECT_EQ(image->GetDimensions()[0], 12 + 2);
+    EXPECT_EQ(image->GetDimensions()[1], 9 + 2);
+    EXPECT_EQ(image->GetDimensions()[2], 1 + 2);
+    EXPECT_EQ(image->GetOrigin()[0], -10 * kFlatSpacing * 1000);
+    EXPECT_EQ(image->GetOrigin()[2], 3 * kFlatSpacing * 1000);
     EXPECT_EQ(image->GetSpacing()[2], kFlatSpacing * 1000);
-    EXPECT_EQ(image->GetNumberOfCells(), 11 * 8);
-    EXPECT_EQ(image->GetPointData()->GetArray("f")->GetTuple1(8 * 12), double(valueAt(0, {-9, 3, 4}, 0)));
+    EXPECT_EQ(image->GetNumberOfCells(), 13 * 10 * 2);
+    EXPECT_EQ(image->GetPointData()->GetArray("f")->GetTuple1(1 + 14 * (9 + 11)),
+              double(valueAt(0, {-9, 3, 4}, 0)));
+}
+
+// Programs that take the range of all points see that of the field, zeros around it or not.
+TEST_F(VtiTest, HiddenPointsDontChangeARange) {
+    const ValueFunction value = [](int, const Vec3i& p, int channel) {
+        return channel == 2 && p.x == 3 ? kNaN : float(700 + 3 * p.x - p.y + channel);
+    };
+    BrickResult result = flatResult(4, value);
+    writeVti(file("out.vti"), {{"T", "T", "point", 1, 0}, {"U", "U", "point", 3, 1}}, result, flatOptions(),
+             {});
+    vtkPointData* data = read("out.vti")->GetPointData();
+    vtkDataArray* ghosts = data->GetArray("vtkGhostType");
+    std::int64_t hidden = 0;
+    for (const char* name : {"T", "U"}) {
+        vtkDataArray* array = data->GetArray(name);
+        for (int c = -1; c < array->GetNumberOfComponents(); ++c) {  // -1: the length
+            double low = HUGE_VAL, high = -HUGE_VAL;
+            for (vtkIdType i = 0; i < array->GetNumberOfTuples(); ++i) {
+                const double* tuple = array->GetTuple(i);
+                double shown = c < 0 ? 0 : tuple[c];
+                for (int k = 0; c < 0 && k < array->GetNumberOfComponents(); ++k)
+                    shown += tuple[k] * tuple[k];
+                if (c < 0) shown = std::sqrt(shown);
+                hidden += ghosts->GetTuple1(i) != 0;
+                if (ghosts->GetTuple1(i) != 0 || std::isnan(shown)) continue;
+                low = std::min(low, shown);
+                high = std::max(high, shown);
+            }
+            EXPECT_EQ(array->GetRange(c)[0], low) << name << c;
+            EXPECT_EQ(array->GetRange(c)[1], high) << name << c;
+        }
+    }
+    EXPECT_GT(hidden, 0);
 }
 
 // VTK tells cells beside a hidden point apart by flags that are written too.

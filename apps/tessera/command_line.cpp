@@ -225,8 +225,11 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
                     "the flat layout, which Blender and Houdini interpolate without looking at the mesh; 0 "
                     "for levels)")
         ->group(group);
-    command.add_option("--background", a.background, "value of voxels that are not stored")
-        ->capture_default_str()
+    command
+        .add_option(
+            "--background", a.background,
+            "value of voxels that are not stored (default: 0; in a .vti file, which has them all, a value "
+            "of the field)")
         ->group(group);
     command
         .add_option("--unit-scale", a.unitScale,

@@ -71,9 +71,9 @@ void checkRanges(const ResampleArguments& a) {
         require(std::abs(*a.voxelShift) <= 1,
                 fmt::format("--voxel-shift: expected -1 to 1, got {}", *a.voxelShift));
     const double largest = a.half ? kLargestHalf : double(std::numeric_limits<float>::max());
-    require(std::abs(a.background) <= largest,
+    require(!a.background || std::abs(*a.background) <= largest,
             fmt::format("--background: expected a number within {:.9g}, the largest of {}-bit floats, got {}",
-                        largest, a.half ? 16 : 32, a.background));
+                        largest, a.half ? 16 : 32, a.background.value_or(0)));
     if (a.unitScale)
         require(*a.unitScale >= kSmallestUnitScale && *a.unitScale <= kLargestUnitScale,
                 fmt::format("--unit-scale: expected {} to {}, got {}", kSmallestUnitScale, kLargestUnitScale,
@@ -164,7 +164,8 @@ ResampleSettings checkedSettings(const ResampleArguments& a) {
     s.format = &outputFormat(a);
     s.write.layout = chooseLayout(a, *s.format);
     s.write.halfFloat = a.half;
-    s.write.background = float(a.background);
+    s.write.background = float(a.background.value_or(0));
+    if (a.background) s.write.hiddenValue = float(*a.background);
     s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
     s.write.voxelShift = a.voxelShift.value_or(0);
     s.write.unitScale = a.unitScale.value_or(0);

@@ -69,9 +69,9 @@ struct ResampleArguments {
     std::optional<std::string> maxError;
     double samplesPerElement = 2;
     int brickSize = 16;
-    std::optional<int> extendLayers;  ///< not given: 1 for the flat layout, 0 for levels
-    double background = 0;
-    std::optional<double> unitScale;  ///< not given: 1, or a power of ten when voxels are tiny
+    std::optional<int> extendLayers;   ///< not given: 1 for the flat layout, 0 for levels
+    std::optional<double> background;  ///< not given: 0, in a .vti file what writeVti says
+    std::optional<double> unitScale;   ///< not given: 1, or a power of ten when voxels are tiny
     int timeStep = -1;
     std::string fields, errorFields, bounds, like, maxVoxels;
     bool half = false;

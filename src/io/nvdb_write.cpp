@@ -5,6 +5,7 @@
 
 #include <nanovdb/util/IO.h>
 #include <nanovdb/util/OpenToNanoVDB.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <cstdlib>
@@ -87,7 +88,9 @@ VdbWriteResult writeNvdb(const std::string& path, const std::vector<OutputField>
     AtomicFileBuffer buffer(file, execution);
     std::ostream stream(&buffer);
     stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);
-    tbb::task_arena threads(execution.threadCount());
+    const int threadCount = execution.threadCount();
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, std::size_t(threadCount));
+    tbb::task_arena threads(threadCount);
     for (std::size_t g = 0; g < grids.size(); ++g) {
         execution.throwIfCancelled();
         execution.report(Stage::writing, std::int64_t(g), std::int64_t(grids.size()));

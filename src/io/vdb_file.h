@@ -41,6 +41,7 @@ struct VdbWriteOptions {
         0;  ///< the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
+    std::optional<float> hiddenValue;  ///< .vti: of points that nothing is stored for; see writeVti
     std::int64_t maxVoxels = 0;        ///< .vti: points that the image may have; 0: kDefaultImagePoints
     std::string algorithm, criterion, sourceFile;
     std::string target;          ///< the device, of algorithms whose results depend on it; else empty

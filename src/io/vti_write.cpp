@@ -8,8 +8,8 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
+#include <glm/common.hpp>
 #include <limits>
-#include <map>
 
 #include "base/error.h"
 #include "io/atomic_file.h"
@@ -26,16 +26,13 @@ constexpr char kHiddenPoint = 2, kHiddenCell = 32;
 
 constexpr std::int64_t kBlockItems = 1 << 15;  // points or cells that are compressed together
 constexpr std::int64_t kBatchBlocks = 64;      // blocks that are held at once
-constexpr int kCompressionLevel = 4;
+constexpr int kCompressionLevel = 1;           // floats hardly shrink more by higher ones
 constexpr std::size_t kOffsetDigits = 20;
 
 /// 8^3 points: samples, or points outside the mesh that carry a value, or both.
 struct PointTile {
     const Tile* samples = nullptr;
     const Tile* extension = nullptr;
-    std::uint64_t word(std::size_t w) const {
-        return (samples ? samples->coverage[w] : 0) | (extension ? extension->coverage[w] : 0);
-    }
 };
 
 /// What is stored at a point: a tile that has its values, or null.
@@ -45,69 +42,83 @@ struct StoredPoint {
     bool isCovered = false;
 };
 
-/// The tiles of a flat grid in an array, and the box of their points.
-class PointBox {
-  public:
-    PointBox(const BrickTree& tree, const BrickStore& store);
-    bool isEmpty() const { return min_.x > max_.x; }
-    const Vec3i& min() const { return min_; }
-    std::int64_t size(int axis) const { return std::int64_t(max_[axis]) - min_[axis] + 1; }
-    double pointCount() const { return double(size(0)) * double(size(1)) * double(size(2)); }
-
-    /// To be called before `at`, once the size is known to be bearable.
-    void arrange();
-    /// @param x, y, z from the box's first point.
-    StoredPoint at(std::int64_t x, std::int64_t y, std::int64_t z) const;
-
-  private:
-    void add(const Vec3i& tile, const Tile* samples, const Tile* extension);
-
-    std::map<std::array<int, 3>, PointTile> found_;
-    std::vector<PointTile> tiles_;
-    Vec3i firstTile_{0};
-    std::array<std::int64_t, 3> tileCounts_{};
-    Vec3i min_{std::numeric_limits<int>::max()}, max_{std::numeric_limits<int>::min()};
-};
-
-PointBox::PointBox(const BrickTree& tree, const BrickStore& store) {
+/// Calls visit(index, samples, extension) for every tile of a flat grid: its first point over 8, and what it
+/// holds, one of both null. A tile may come once for its samples and once for its extension.
+template <class Visit>
+void forTiles(const BrickTree& tree, const BrickStore& store, const Visit& visit) {
     const int n = store.tilesPerEdge();
     for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
         const Vec3i first = floorDiv(tree.ownedPoints(tree.leaves()[leaf]).min, kTileSize);
         for (int t = 0; t < store.tileCount(); ++t)
             if (const Tile* tile = store.tile(leaf, t))
-                add(first + Vec3i(t / (n * n), t / n % n, t % n), tile, nullptr);
+                visit(first + Vec3i(t / (n * n), t / n % n, t % n), tile, nullptr);
     }
-    for (const auto& [key, tile] : store.extension()) add(key.index, nullptr, &tile);
+    for (const auto& [key, tile] : store.extension()) visit(key.index, nullptr, &tile);
 }
 
-void PointBox::add(const Vec3i& tile, const Tile* samples, const Tile* extension) {
-    PointTile& stored = found_[{tile.z, tile.y, tile.x}];
-    if (samples) stored.samples = samples;
-    if (extension) stored.extension = extension;
-    for (std::size_t w = 0; w < 8; ++w)
-        for (std::uint64_t bits = PointTile{samples, extension}.word(w); bits != 0; bits &= bits - 1) {
-            const Vec3i p = tile * kTileSize + pointInTile(int(w) * 64 + std::countr_zero(bits));
-            for (int axis = 0; axis < 3; ++axis) {
-                min_[axis] = std::min(min_[axis], p[axis]);
-                max_[axis] = std::max(max_[axis], p[axis]);
-            }
-        }
+/// Calls visit(tile, offset) for every point that a flat grid stores.
+template <class Visit>
+void forPoints(const BrickTree& tree, const BrickStore& store, const Visit& visit) {
+    forTiles(tree, store, [&](const Vec3i& index, const Tile* samples, const Tile* extension) {
+        const Tile& tile = samples ? *samples : *extension;
+        for (std::size_t w = 0; w < 8; ++w)
+            for (std::uint64_t bits = tile.coverage[w]; bits != 0; bits &= bits - 1)
+                visit(index, tile, int(w) * 64 + std::countr_zero(bits));
+    });
 }
 
-void PointBox::arrange() {
+/// The box of a flat grid's points and one layer around it, and the tiles there in an array.
+///
+/// Nothing is stored in that layer, so all cells at the image's border are hidden: ParaView 5.11 shows wrong
+/// faces, or crashes, where some cells are hidden and one at the border isn't.
+class PointBox {
+  public:
+    PointBox(const BrickTree& tree, const BrickStore& store);
+    bool isEmpty() const { return count_ == 0; }
+    std::int64_t storedPoints() const { return count_; }
+    const Vec3i& min() const { return min_; }
+    std::int64_t size(int axis) const { return std::int64_t(max_[axis]) - min_[axis] + 1; }
+    double pointCount() const { return double(size(0)) * double(size(1)) * double(size(2)); }
+
+    /// To be called before `at`, once the size is known to be bearable.
+    void arrange(const BrickTree& tree, const BrickStore& store);
+    /// @param x, y, z from the box's first point.
+    StoredPoint at(std::int64_t x, std::int64_t y, std::int64_t z) const;
+
+  private:
+    std::vector<PointTile> tiles_;
+    Vec3i firstTile_{0};
+    std::array<std::int64_t, 3> tileCounts_{};
+    Vec3i min_{std::numeric_limits<int>::max()}, max_{std::numeric_limits<int>::min()};
+    std::int64_t count_ = 0;
+};
+
+PointBox::PointBox(const BrickTree& tree, const BrickStore& store) {
+    forPoints(tree, store, [&](const Vec3i& tile, const Tile&, int offset) {
+        const Vec3i p = tile * kTileSize + pointInTile(offset);
+        min_ = glm::min(min_, p);
+        max_ = glm::max(max_, p);
+        ++count_;
+    });
+    if (isEmpty()) return;
+    min_ -= 1;
+    max_ += 1;
+}
+
+void PointBox::arrange(const BrickTree& tree, const BrickStore& store) {
     firstTile_ = floorDiv(min_, kTileSize);
     const Vec3i lastTile = floorDiv(max_, kTileSize);
     for (int axis = 0; axis < 3; ++axis)
         tileCounts_[std::size_t(axis)] = std::int64_t(lastTile[axis]) - firstTile_[axis] + 1;
     tiles_.resize(std::size_t(tileCounts_[0] * tileCounts_[1] * tileCounts_[2]));
-    for (const auto& [zyx, tile] : found_) {
-        const std::int64_t x = std::int64_t(zyx[2]) - firstTile_.x, y = std::int64_t(zyx[1]) - firstTile_.y,
-                           z = std::int64_t(zyx[0]) - firstTile_.z;
-        // A tile without a point may lie outside.
-        if (x >= 0 && y >= 0 && z >= 0 && x < tileCounts_[0] && y < tileCounts_[1] && z < tileCounts_[2])
-            tiles_[std::size_t((z * tileCounts_[1] + y) * tileCounts_[0] + x)] = tile;
-    }
-    found_.clear();
+    forTiles(tree, store, [&](const Vec3i& index, const Tile* samples, const Tile* extension) {
+        const Vec3i t = index - firstTile_;
+        for (int axis = 0; axis < 3; ++axis)  // a tile without a point may lie outside
+            if (t[axis] < 0 || t[axis] >= tileCounts_[std::size_t(axis)]) return;
+        PointTile& tile = tiles_[std::size_t((t.z * tileCounts_[1] + t.y) * tileCounts_[0] + t.x)];
+        if (samples) tile.samples = samples;
+        if (extension) tile.extension = extension;
+    });
 }
 
 StoredPoint PointBox::at(std::int64_t x, std::int64_t y, std::int64_t z) const {
@@ -147,19 +158,40 @@ void forItems(const std::array<std::int64_t, 3>& size, std::int64_t begin, std::
     }
 }
 
+/// What the components of a field are where nothing is stored: the stored value that is closest to 0.
+/// Programs that don't leave out hidden points then still see no value that the field doesn't have, nor
+/// another range.
+std::vector<float> smallestValue(const OutputField& field, const BrickResult& result) {
+    std::vector<float> smallest(static_cast<std::size_t>(field.components)), value(smallest);
+    double smallestSquare = std::numeric_limits<double>::infinity();
+    forPoints(result.tree, result.store, [&](const Vec3i&, const Tile& tile, int offset) {
+        double square = 0;
+        for (std::size_t c = 0; c < value.size(); ++c) {
+            value[c] = tile.channel(field.firstChannel + int(c))[offset] + 0.0f;  // no -0
+            square += double(value[c]) * double(value[c]);
+        }
+        // Of equal ones the least, whatever order they come in. One that isn't finite is never taken.
+        if (!(square < smallestSquare || (square == smallestSquare && value < smallest)) ||
+            !std::isfinite(square))
+            return;
+        smallest = value;
+        smallestSquare = square;
+    });
+    return smallest;
+}
+
 ImageArray valueArray(const OutputField& field, const PointBox& box, const std::array<std::int64_t, 3>& size,
-                      float background) {
-    const auto fill = [&box, size, background, first = field.firstChannel, components = field.components](
-                          std::int64_t begin, std::int64_t end, char* bytes) {
-        std::vector<float> values(static_cast<std::size_t>(components));
+                      const std::vector<float>& hidden) {
+    const auto fill = [&box, size, hidden, first = field.firstChannel](std::int64_t begin, std::int64_t end,
+                                                                       char* bytes) {
+        std::vector<float> values(hidden.size());
         const std::size_t itemBytes = values.size() * sizeof(float);
         forItems(size, begin, end, [&](std::int64_t i, std::int64_t x, std::int64_t y, std::int64_t z) {
             const StoredPoint point = box.at(x, y, z);
             bool isFinite = true;
-            for (int c = 0; c < components; ++c) {
-                float& value = values[std::size_t(c)];
-                value = point.tile ? point.tile->channel(first + c)[point.offset] : background;
-                isFinite = isFinite && std::isfinite(value);
+            for (std::size_t c = 0; c < values.size(); ++c) {
+                values[c] = point.tile ? point.tile->channel(first + int(c))[point.offset] : hidden[c];
+                isFinite = isFinite && std::isfinite(values[c]);
             }
             if (!isFinite) std::fill(values.begin(), values.end(), std::numeric_limits<float>::quiet_NaN());
             std::memcpy(bytes + std::size_t(i) * itemBytes, values.data(), itemBytes);
@@ -187,20 +219,14 @@ ImageArray pointGhosts(const PointBox& box, const std::array<std::int64_t, 3>& s
     return {kGhostName, "UInt8", 1, 1, size[0] * size[1] * size[2], fill, 0};
 }
 
-/// A cell is hidden when one of its corners is. An image of one layer has flat cells.
+/// A cell is hidden when one of its corners is.
 ImageArray cellGhosts(const PointBox& box, const std::array<std::int64_t, 3>& size) {
-    std::array<std::int64_t, 3> cells{}, steps{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        cells[axis] = std::max<std::int64_t>(1, size[axis] - 1);
-        steps[axis] = size[axis] > 1;
-    }
-    const auto fill = [&box, cells, steps](std::int64_t begin, std::int64_t end, char* bytes) {
+    const std::array<std::int64_t, 3> cells{size[0] - 1, size[1] - 1, size[2] - 1};
+    const auto fill = [&box, cells](std::int64_t begin, std::int64_t end, char* bytes) {
         forItems(cells, begin, end, [&](std::int64_t i, std::int64_t x, std::int64_t y, std::int64_t z) {
             bool isWhole = true;
             for (int corner = 0; corner < 8 && isWhole; ++corner)
-                isWhole = box.at(x + (corner & 1) * steps[0], y + (corner >> 1 & 1) * steps[1],
-                                 z + (corner >> 2) * steps[2])
-                              .tile != nullptr;
+                isWhole = box.at(x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)).tile != nullptr;
             bytes[i] = isWhole ? 0 : kHiddenCell;
         });
     };
@@ -364,16 +390,9 @@ std::vector<ImageArray> describe(const std::vector<OutputField>& fields, const B
                                  const VdbWriteOptions& options, double unitScale) {
     std::vector<ImageArray> entries;
     for (const auto& [key, value] : encodeMetadata(describeFile(fields, result, options, unitScale)))
-        if (key != "tessera_bricks") entries.push_back(textArray(key, value));
+        if (key != "tessera_bricks" && key != "tessera_background") entries.push_back(textArray(key, value));
     if (options.time) entries.push_back(numberArray("TimeValue", *options.time));
     return entries;
-}
-
-std::int64_t storedPoints(const BrickStore& store) {
-    std::int64_t count = store.coveredPoints();
-    for (const auto& [key, tile] : store.extension())
-        for (const std::uint64_t word : tile.coverage) count += std::popcount(word);
-    return count;
 }
 
 }  // namespace
@@ -398,13 +417,16 @@ VdbWriteResult writeVti(const std::string& path, const std::vector<OutputField>&
     AtomicFile file(path);
     PointBox box(result.tree, result.store);
     checkSize(box, options);
-    box.arrange();
+    box.arrange(result.tree, result.store);
     const std::array<std::int64_t, 3> size{box.size(0), box.size(1), box.size(2)};
     ImageParts parts;
     parts.fieldData = describe(fields, result, options, written.unitScale);
     std::string scalars;
     for (const OutputField& field : fields) {
-        parts.pointData.push_back(valueArray(field, box, size, options.background));
+        parts.pointData.push_back(valueArray(
+            field, box, size,
+            options.hiddenValue ? std::vector<float>(std::size_t(field.components), *options.hiddenValue)
+                                : smallestValue(field, result)));
         if (field.components == 1 && scalars.empty()) scalars = field.name;
     }
     parts.pointData.push_back(maskArray(box, size));
@@ -424,7 +446,7 @@ VdbWriteResult writeVti(const std::string& path, const std::vector<OutputField>&
         for (const ImageArray& array : *arrays) writer.write(array);
     const std::string footer = "\n</AppendedData>\n</VTKFile>\n";
     file.writeAt(file.size(), footer.data(), footer.size());
-    written.activeVoxels = storedPoints(result.store);
+    written.activeVoxels = box.storedPoints();
     written.fileBytes = file.size();
     file.commit(execution);
     return written;
