@@ -155,9 +155,10 @@ std::string voxelsText(const VoxelCheck& check, const OutsideReading& reading, c
         text += fmt::format("  {} voxels lie in elements too thin to check their values\n",
                             formatCount(s.undecided));
     if (check.derived + check.missingDerived + check.unexpected > 0)
-        text += fmt::format("  interpolated or outside the mesh: {}; {} wrong, {} missing, {} unexpected\n",
-                            formatCount(check.derived), formatCount(check.wrongDerived),
-                            formatCount(check.missingDerived), formatCount(check.unexpected));
+        text += fmt::format(
+            "  worked out anew from the samples: {} voxels; {} wrong, {} missing, {} unexpected\n",
+            formatCount(check.derived), formatCount(check.wrongDerived), formatCount(check.missingDerived),
+            formatCount(check.unexpected));
     if (file.strayValues > 0)
         text +=
             fmt::format("  {} inactive voxels don't hold the background\n", formatCount(file.strayValues));
@@ -243,7 +244,10 @@ int runVerify(const VerifyArguments& arguments) {
     std::vector<Comparison> rows = compareReports(mesh, fields, file.report, measured, file.halfFloat);
     const VoxelCheck voxels = check(mesh, fields, file, session.execution);
     OutsideReading reading = readAsOutsider(arguments.vdbPath, file, mesh, fields, session.execution);
-    if (isFlat && file.layers == 0) reading.incomplete = 0;  // nothing is promised then
+    if (isFlat && file.layers == 0) {  // nothing is promised then, and the report counts the gaps
+        reading.incomplete = 0;
+        reading.firstProblem.clear();
+    }
     const std::vector<Comparison> read = compareReading(mesh, fields, file.report, reading);
     rows.insert(rows.end(), read.begin(), read.end());
     times.verifyMs = timer.elapsedMs();

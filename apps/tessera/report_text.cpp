@@ -166,8 +166,9 @@ std::string errorText(const ErrorReport& report) {
     text += fmt::format(
         "  measured at {} nodes and {} centroids; {} of them in cells wholly inside the mesh\n",
         formatCount(report.nodes), formatCount(report.centroids), percent(report.fullyCoveredShare));
-    const std::string skipped =
-        countsByField(report, [](const FieldError& f) { return f.samples > 0 ? f.skippedSamples : 0; });
+    const std::string skipped = countsByField(report, [&](const FieldError& f) {
+        return f.samples > 0 ? std::max<std::int64_t>(0, f.skippedSamples - report.incomplete) : 0;
+    });
     if (!skipped.empty()) text += fmt::format("  left out, without a finite value: samples of {}\n", skipped);
     const std::string invalid = countsByField(report, [&](const FieldError& f) {
         return f.samples > 0 ? report.coveredPoints - f.validPoints : 0;

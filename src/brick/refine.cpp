@@ -414,8 +414,12 @@ std::string exceededBound(const TetMesh& mesh, std::span<const int> fields, cons
         const double bound = boundOf(options, error.range);
         if (bound == 0) continue;  // a constant field has no relative error
         if (error.samples == 0)
-            return "no measured error: no sample of field " + error.name +
-                   " has a finite value as a 32-bit float";
+            return report.nodes + report.centroids == 0
+                       ? "no measured error: no node or centroid lies inside the bounds"
+                   : report.incomplete > 0
+                       ? "no measured error: every sample lies beside voxels that aren't there"
+                       : "no measured error: no sample of field " + error.name +
+                             " has a finite value as a 32-bit float";
         const double reached = rms ? error.rms : error.max;
         if (reached / bound <= worst) continue;
         worst = reached / bound;
