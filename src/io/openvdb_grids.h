@@ -2,6 +2,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include "io/vdb_file.h"
+
 // OpenVDB's library holds the members of these, as it registers them to read files: compiling them again
 // costs a minute a source. Without optimisation small ones would be called that the library has only inlined.
 #ifdef __OPTIMIZE__
@@ -12,3 +14,22 @@ extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::Vec3STree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::BoolTree::RootNodeType>;
 #endif
+
+namespace tessera {
+
+/// A place's or a vector's components in the file's axes, from those of the mesh.
+template <class Vector>
+Vector turned(const Vector& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return Vector(v[0], v[2], -v[1]);
+    if (upAxis == UpAxis::z) return Vector(v[0], -v[2], v[1]);
+    return v;
+}
+/// The way back.
+template <class Vector>
+Vector turnedBack(const Vector& v, UpAxis upAxis) {
+    if (upAxis == UpAxis::y) return Vector(v[0], -v[2], v[1]);
+    if (upAxis == UpAxis::z) return Vector(v[0], v[2], -v[1]);
+    return v;
+}
+
+}  // namespace tessera

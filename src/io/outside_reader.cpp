@@ -19,19 +19,6 @@ namespace {
 constexpr std::int64_t kChunk = 4096;
 constexpr double kOnPlane = 0x1p-20;  // voxels: what rounding in the transform may move a place by
 
-openvdb::Vec3d filePlace(const VdbFile& file, const Vec3d& world) {
-    const Vec3d p = world * file.unitScale;
-    if (file.upAxis == UpAxis::y) return {p.x, p.z, -p.y};
-    if (file.upAxis == UpAxis::z) return {p.x, -p.z, p.y};
-    return {p.x, p.y, p.z};
-}
-
-openvdb::Vec3f turnedBack(const openvdb::Vec3f& v, UpAxis upAxis) {
-    if (upAxis == UpAxis::y) return {v.x(), -v.z(), v.y()};
-    if (upAxis == UpAxis::z) return {v.x(), v.z(), -v.y()};
-    return v;
-}
-
 // Whether the eight voxels around an index are active, but for those without weight.
 template <class Accessor>
 bool isComplete(const Accessor& accessor, const openvdb::Vec3d& index) {
@@ -144,7 +131,9 @@ class OutsideReader {
                 for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
                     if (level_[i] != level || (field.isCell() && i < samples_.nodeCount())) continue;
                     const Vec3d world = samples_.placeWorld(i, Vec3d(0)) + shift;
-                    const openvdb::Vec3d index = grid.transform().worldToIndex(filePlace(file_, world));
+                    const Vec3d place = world * file_.unitScale;
+                    const openvdb::Vec3d index = grid.transform().worldToIndex(
+                        turned(openvdb::Vec3d(place.x, place.y, place.z), file_.upAxis));
                     if (!isComplete(accessor, index)) {
                         squares_[i] = -1;
                         if (!isFinite) continue;

@@ -204,13 +204,6 @@ void readCoverage(const openvdb::BoolGrid& grid, int level, VdbFile& file) {
         throw InputError("grid " + grid.getName() + " covers points outside the bricks of its level");
 }
 
-// Undoes the turn of the axes that the writer made.
-openvdb::Vec3f turnedBack(const openvdb::Vec3f& v, UpAxis upAxis) {
-    if (upAxis == UpAxis::y) return {v.x(), -v.z(), v.y()};
-    if (upAxis == UpAxis::z) return {v.x(), v.z(), -v.y()};
-    return v;
-}
-
 template <class Grid, class Put>
 void readValues(const Grid& grid, int level, VdbFile& file, const Put& put) {
     typename Grid::ConstAccessor accessor = grid.getConstAccessor();
@@ -260,12 +253,6 @@ void readExtension(const Grid& grid, int level, VdbFile& file, const Put& put) {
     }
 }
 
-openvdb::Vec3d turned(const Vec3d& v, UpAxis upAxis) {
-    if (upAxis == UpAxis::y) return {v.x, v.z, -v.y};
-    if (upAxis == UpAxis::z) return {v.x, -v.z, v.y};
-    return {v.x, v.y, v.z};
-}
-
 // Notes a grid that stands elsewhere than the description says, or has another background.
 void checkFrame(const openvdb::GridBase& grid, int level, VdbFile& file) {
     const double h = file.tree.spacingWorld(level) * file.unitScale;
@@ -274,13 +261,12 @@ void checkFrame(const openvdb::GridBase& grid, int level, VdbFile& file) {
     // Steps are differences of places, so they carry the rounding of the origin.
     const double slack = 1e-9 * h + 1e-15 * (far + h);
     const openvdb::Vec3d first = grid.transform().indexToWorld(openvdb::Vec3d(0.0));
-    bool fits = (first - turned(origin, file.upAxis)).length() <= slack;
+    bool fits = (first - turned(openvdb::Vec3d(origin.x, origin.y, origin.z), file.upAxis)).length() <= slack;
     for (int axis = 0; axis < 3; ++axis) {
-        Vec3d step(0);
-        step[axis] = 1;
-        const openvdb::Vec3d index(step.x, step.y, step.z);
+        openvdb::Vec3d index(0.0);
+        index[axis] = 1;
         const openvdb::Vec3d found = grid.transform().indexToWorld(index) - first;
-        fits = fits && (found - turned(step * h, file.upAxis)).length() <= slack;
+        fits = fits && (found - turned(index * h, file.upAxis)).length() <= slack;
     }
     if (!fits)
         file.gridProblems.push_back("grid " + grid.getName() +

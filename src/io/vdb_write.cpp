@@ -35,13 +35,6 @@ openvdb::Coord coord(const Vec3i& p) {
     return openvdb::Coord(p.x, p.y, p.z);
 }
 
-// A vector's components in the file's axes.
-openvdb::Vec3f turned(const openvdb::Vec3f& v, UpAxis upAxis) {
-    if (upAxis == UpAxis::y) return {v.x(), v.z(), -v.y()};
-    if (upAxis == UpAxis::z) return {v.x(), -v.z(), v.y()};
-    return v;
-}
-
 // Where a grid's transform places voxel (0, 0, 0), in the mesh's axes and unit.
 Vec3d gridOriginWorld(const BrickTree& tree, int level, double voxelShift) {
     if (voxelShift == 0) return tree.originWorld();  // keeps the sign of a zero
@@ -188,7 +181,7 @@ class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
         const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1),
                     *z = tile.channel(channel_ + 2);
         for (std::size_t i = 0; i < kTilePoints; ++i)
-            if (mask[i >> 6] >> (i & 63) & 1) values[i] = turned({x[i], y[i], z[i]}, upAxis_);
+            if (mask[i >> 6] >> (i & 63) & 1) values[i] = turned(openvdb::Vec3f(x[i], y[i], z[i]), upAxis_);
         setMask(leaf, mask);
     }
 
