@@ -763,6 +763,19 @@ class Reports(AppTest):
         self.assertLess(report["error"]["f"]["valid_points"], 9**3)
         self.assertTrue(self.report("verify", "nan.vtu", "out.vdb")["holds"])
 
+    def test_values_whose_range_passes_float_verify(self):
+        self.write("wide.vtu", vtu_text(fields={"f": [3.4e38 * (2 * p[0] - 1) for p in CUBE_POINTS]}))
+        for resolution in (3, 4, 17):
+            self.succeed("resample", "wide.vtu", "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", resolution)
+            self.assertTrue(self.report("verify", "wide.vtu", "out.vdb")["holds"])
+
+    def test_voxels_small_beside_their_place_verify(self):
+        points = [[1e8 + 1e-3 * x for x in p] for p in CUBE_POINTS]
+        self.write("far.vtu", vtu_text(points=points))
+        for options in (["--layout", "levels"], ["--layout", "flat"], ["--layout", "flat", "--up-axis", "y"]):
+            self.succeed("resample", "far.vtu", "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "40", *options)
+            self.assertTrue(self.report("verify", "far.vtu", "out.vdb")["holds"])
+
     def test_any_number_of_threads_gives_the_same_file(self):
         files = set()
         for threads in (1, 2, 5):
@@ -1085,6 +1098,7 @@ class Series(AppTest):
         self.assertEqual(self.report("info", "half_1.vdb")["source"], "halves.pvd")
         self.assertIn("claims hold", self.succeed("verify", "halves.pvd", "half_0.vdb", "--time-step", "0"))
         self.assertEqual(self.report("info", "halves.pvd", "--time-step", "1")["mesh"]["fields"][0]["ranges"], [[1, 2]])
+        self.assertEqual(self.report("resample", "halves.pvd", "--time-step", "0", "-o", "one.vdb", *self.COARSE)["time"], 0.1)
         self.reject(2, "halves.pvd 2", "info", "halves.pvd", "--time-step", "2")
         self.reject(2, "would replace", "tets", "halves.pvd", "-o", "half_0_1.vtu")
 

@@ -298,6 +298,10 @@ TEST(ReadVtu, RenamesACellFieldThatHasThePointFieldsName) {
     ASSERT_EQ(one.mesh.fields.size(), 1u);
     EXPECT_EQ(one.mesh.fields[0].values, (std::vector<double>{6, 7}));
     EXPECT_EQ(read(path, {{"T"}, -1}).mesh.fields.size(), 1u);
+    EXPECT_EQ(field(read(path, {{"cell:T"}, -1}), "T_cell").values, (std::vector<double>{6, 7}));
+    EXPECT_EQ(read(path, {{"point:T"}, -1}).mesh.fields[0].location, FieldLocation::point);
+    EXPECT_EQ(read(path, {{"point:T", "cell:T"}, -1}).mesh.fields.size(), 2u);
+    EXPECT_THROW(read(path, {{"cell:T_point"}, -1}), InputError);
 }
 
 TEST(ReadVtu, WarnsAboutFieldsItLeavesOut) {

@@ -55,15 +55,15 @@ std::string voxelsText(const VdbFile& file) {
         return text;
     }
     std::string text =
-        fmt::format("  one grid of spacing {:.9g}: {} voxels in the mesh, {} outside\n  from bricks",
+        fmt::format("  one grid of spacing {:.9g}: {} voxels in the mesh, {} outside\n",
                     file.tree.spacingWorld(), formatCount(file.store.coveredPoints()), formatCount(extended));
-    const char* separator = " ";
+    const char* separator = "  from bricks ";
     for (const LevelSummary& level : summarizeLevels(*file.bricks, {})) {
         text +=
             fmt::format("{}of spacing {:.6g}: {}", separator, level.spacingWorld, formatCount(level.bricks));
         separator = ", ";
     }
-    return text + "\n";
+    return file.bricks->leafCount() > 0 ? text + "\n" : text;
 }
 
 /// Prints what the file holds, and gives the same as a document when one is wanted.

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 
 #include "base/error.h"
 #include "base/timer.h"
@@ -31,6 +32,9 @@ struct Step {
 
 std::vector<Step> listSteps(const ResampleArguments& arguments) {
     std::vector<SeriesStep> sources = listSeries(arguments.inputs);
+    // Of a .pvd file --time-step names a step.
+    if (arguments.inputs.size() == 1 && isCollectionName(arguments.inputs[0]) && arguments.timeStep >= 0)
+        sources = {chosenStep(arguments.inputs[0], arguments.timeStep)};
     if (!arguments.times.empty()) sources = stepsWithin(sources, parseTimes(arguments.times));
     if (sources.size() > 1 && !arguments.output.empty() && !takesNumber(arguments.output))
         throw InputError(fmt::format(
@@ -83,6 +87,7 @@ class ResampleRun {
     Json runStep(const Step& step);
     Json dryRun(const Step& step, const MeshFile& file, const FieldSelection& selection,
                 const RefineOptions& options, StageTimes& times);
+    void fellShort(const Step& step, const std::string& what);
     void warnUnbounded(const Step& step, const BrickResult& result);
     void declareStages();
     std::string flatNote(const BrickTree& tree, int channels) const;
@@ -103,7 +108,8 @@ class ResampleRun {
     Json series_;
     bool isSeries_ = false;
     std::optional<FixedFrame> seriesFrame_;
-    SampleBudget budget_;  // of the step at hand
+    SampleBudget budget_;                            // of the step at hand
+    std::map<std::string, std::size_t> stepsShort_;  // by what was said: how many steps it holds for
 };
 
 int ResampleRun::run() {
@@ -124,6 +130,10 @@ int ResampleRun::run() {
             session_.progress.beginStep("step", i + 1, steps.size(), 1, double(steps.size() - 1 - i));
         reports.push_back(runStep(steps[i]));
     }
+    for (const auto& [what, count] : stepsShort_)
+        if (count > 1)
+            session_.warnFellShort(fmt::format("{} more {} like this: {}", count - 1,
+                                               count == 2 ? "step is" : "steps are", what));
     if (arguments_.common.jsonPath.empty()) return session_.exitCode();
     if (steps.size() == 1) {
         writeJson(arguments_.common.jsonPath, reports[0]);
@@ -159,8 +169,9 @@ void ResampleRun::declareStages() {
 }
 
 ImportedMesh ResampleRun::read(const Step& step) {
+    const int timeStep = step.source.collection.empty() ? arguments_.timeStep : -1;
     const ReadOptions options =
-        readOptions(step.source, sourceNames(settings_.fields, settings_.errorFields), arguments_.timeStep);
+        readOptions(step.source, sourceNames(settings_.fields, settings_.errorFields), timeStep);
     return importMesh(step.source.files[0], options, repair_, session_);
 }
 
@@ -267,11 +278,15 @@ Json ResampleRun::runStep(const Step& step) {
     return report;
 }
 
+/// Said of the first step of a series at once, of the others together at the end.
+void ResampleRun::fellShort(const Step& step, const std::string& what) {
+    const std::string kind = what.substr(0, what.find_first_of(":0123456789"));
+    if (++stepsShort_[kind] == 1) session_.warnFellShort(step.input + ": " + what);
+}
+
 /// A script that looks at the exit code alone would take the file for one within the bound.
 void ResampleRun::warnUnbounded(const Step& step, const BrickResult& result) {
-    if (!result.bounded)
-        session_.warnFellShort(
-            fmt::format("{}: the error is not within the bound: {}", step.input, result.stoppedBecause));
+    if (!result.bounded) fellShort(step, "the error is not within the bound: " + result.stoppedBecause);
 }
 
 /// Empty when a flat file has the finest spacing of the tree, or none is asked for.
@@ -296,9 +311,8 @@ Json ResampleRun::dryRun(const Step& step, const MeshFile& file, const FieldSele
         tree = planBricks(file.mesh, options, session_.execution, selection.channels, &notes);
     }
     times.planMs = timer.elapsedMs();
-    for (const std::string& note : notes) session_.warnFellShort(step.input + ": " + note);
-    if (const std::string note = flatNote(tree, selection.channels); !note.empty())
-        session_.warnFellShort(step.input + ": " + note);
+    for (const std::string& note : notes) fellShort(step, note);
+    if (const std::string note = flatNote(tree, selection.channels); !note.empty()) fellShort(step, note);
     const std::size_t saidNotes = notes.size();
     PlanEstimate estimate = estimatePlan(tree, selection.channels);
     const FlatGridPlan flat = planFlatGrid(tree, selection.channels, outputShape());
@@ -371,8 +385,8 @@ Json ResampleRun::sampleAndWrite(const Step& step, const MeshFile& file, const F
     if (options.criterion == Criterion::error) judgeFile(file.mesh, selection, options, result);
     printResult(step, result, levels, written, times);
     if (options.criterion == Criterion::error) warnUnbounded(step, result);
-    for (const std::string& note : result.notes) session_.warnFellShort(step.input + ": " + note);
-    if (!flat.empty()) session_.warnFellShort(step.input + ": " + flat);
+    for (const std::string& note : result.notes) fellShort(step, note);
+    if (!flat.empty()) fellShort(step, flat);
 
     Json json = levelsJson(result.bricks ? *result.bricks : result.tree, levels);
     json["coverage"] = coverageJson(result.report);

@@ -7,29 +7,19 @@
 #include <set>
 
 #include "base/error.h"
+#include "io/read_mesh.h"
 
 namespace tessera {
 
 namespace {
 
-std::string withoutLocation(const std::string& name) {
-    if (name.starts_with("point:")) return name.substr(6);
-    if (name.starts_with("cell:")) return name.substr(5);
-    return name;
-}
-
-bool matches(const Field& field, const std::string& name) {
-    if (field.name == name) return true;
-    const bool onPoints = field.location == FieldLocation::point;
-    return (name.starts_with("point:") && onPoints && name.substr(6) == field.name) ||
-           (name.starts_with("cell:") && !onPoints && name.substr(5) == field.name);
-}
-
 int findAmong(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name) {
     int found = -1;
     for (const int f : fields) {
         const Field& field = mesh.fields[std::size_t(f)];
-        if (matches(field, name) && (found < 0 || field.location == FieldLocation::point)) found = f;
+        if (isFieldCalled(name, field.name, field.location) &&
+            (found < 0 || field.location == FieldLocation::point))
+            found = f;
     }
     if (found >= 0) return found;
     std::string there;
@@ -60,8 +50,8 @@ std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices,
                                      const std::vector<std::string>& errorFields) {
     std::vector<std::string> names;
     if (choices.empty()) return names;
-    for (const FieldChoice& choice : choices) names.push_back(withoutLocation(choice.source));
-    for (const std::string& name : errorFields) names.push_back(withoutLocation(name));
+    for (const FieldChoice& choice : choices) names.push_back(choice.source);
+    names.insert(names.end(), errorFields.begin(), errorFields.end());
     std::sort(names.begin(), names.end());
     names.erase(std::unique(names.begin(), names.end()), names.end());
     return names;
@@ -81,7 +71,7 @@ FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>&
     const std::vector<int> all = everyField(mesh);
     for (const FieldChoice& choice : choices) {
         const int f = findAmong(mesh, all, choice.source);
-        add(f, choice.name == choice.source ? withoutLocation(choice.name) : choice.name);
+        add(f, choice.name == choice.source ? mesh.fields[std::size_t(f)].name : choice.name);
     }
     if (choices.empty())
         for (const int f : all) add(f, gridName(mesh, mesh.fields[std::size_t(f)], taken));

@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-/// Names to ask a reader for: those of the choices without a "point:" or "cell:" in front. Empty: all.
+/// Names to ask a reader for: those of the choices. Empty: all.
 std::vector<std::string> sourceNames(const std::vector<FieldChoice>& choices,
                                      const std::vector<std::string>& errorFields);
 

@@ -67,6 +67,14 @@ std::string nameOf(const SeriesStep& step) {
                        step.time ? fmt::format(" at time {}", *step.time) : std::string(), step.files.size());
 }
 
+SeriesStep chosenStep(const std::string& collection, int number) {
+    const std::vector<SeriesStep> steps = listSeries(std::span(&collection, 1));
+    if (number >= int(steps.size()))
+        throw InputError(fmt::format("{}: there is no time step {}; it has {}, counted from 0", collection,
+                                     number, steps.size()));
+    return number < 0 ? steps.back() : steps[std::size_t(number)];
+}
+
 ReadOptions readOptions(const SeriesStep& step, std::vector<std::string> fields, int timeStep) {
     return {std::move(fields), timeStep, {step.files.begin() + 1, step.files.end()}};
 }

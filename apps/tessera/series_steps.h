@@ -11,6 +11,9 @@ namespace tessera {
 /// What messages call a step: its file, or its .pvd file with time and number of parts.
 std::string nameOf(const SeriesStep& step);
 
+/// A step of a .pvd file. @param number -1: the last. Throws InputError when there is none of that number.
+SeriesStep chosenStep(const std::string& collection, int number);
+
 /// How to read a step. @param timeStep of files with several steps, ReadOptions::timeStep.
 ReadOptions readOptions(const SeriesStep& step, std::vector<std::string> fields, int timeStep);
 

@@ -35,15 +35,6 @@ void checkReaderOptions(const ReaderArguments& reader) {
         throw InputError("--max-memory bounds a process of its own here: --reader in-process has none");
 }
 
-/// @param number -1: the last.
-SeriesStep chosenStep(const std::string& collection, int number) {
-    const std::vector<SeriesStep> steps = listSeries(std::span(&collection, 1));
-    if (number >= int(steps.size()))
-        throw InputError(fmt::format("{}: there is no time step {}; it has {}, counted from 0", collection,
-                                     number, steps.size()));
-    return number < 0 ? steps.back() : steps[std::size_t(number)];
-}
-
 }  // namespace
 
 void noteStart() {

@@ -272,25 +272,31 @@ void renameTwins(RawBlock& block, ImportStatistics& statistics) {
 }
 
 void selectFields(const std::string& path, RawBlock& block, const ReadOptions& options) {
-    std::set<std::string> available;
-    std::set<std::string> other;
-    for (const ArrayInfo& array : block.arrays) (array.numeric ? available : other).insert(array.name);
     for (const std::string& name : options.fields) {
-        if (available.contains(name)) continue;
-        if (other.contains(name)) throw InputError(path + ": field '" + name + "' isn't numeric");
+        bool isThere = false, isNumeric = false;
+        for (const ArrayInfo& array : block.arrays) {
+            if (!isFieldCalled(name, array.name, array.location)) continue;
+            isThere = true;
+            isNumeric = isNumeric || array.numeric;
+            if (array.numeric && array.components > 9)
+                throw InputError(path + ": field '" + array.name + "' has " +
+                                 std::to_string(array.components) + " components; fields have 1 to 9");
+        }
+        if (isNumeric) continue;
+        if (isThere) throw InputError(path + ": field '" + name + "' isn't numeric");
+        std::set<std::string> available;
+        for (const ArrayInfo& array : block.arrays)
+            if (array.numeric) available.insert(array.name);
         std::string list;
         for (const std::string& there : available) list += (list.empty() ? "" : ", ") + there;
         throw InputError(path + ": there is no field '" + name +
                          "'; there are: " + (list.empty() ? "none" : list));
     }
-    for (const ArrayInfo& array : block.arrays)
-        if (array.components > 9 &&
-            std::find(options.fields.begin(), options.fields.end(), array.name) != options.fields.end())
-            throw InputError(path + ": field '" + array.name + "' has " + std::to_string(array.components) +
-                             " components; fields have 1 to 9");
     if (options.fields.empty()) return;
     std::erase_if(block.fields, [&](const Field& field) {
-        return std::find(options.fields.begin(), options.fields.end(), field.name) == options.fields.end();
+        return std::none_of(options.fields.begin(), options.fields.end(), [&](const std::string& called) {
+            return isFieldCalled(called, field.name, field.location);
+        });
     });
 }
 
@@ -351,12 +357,20 @@ std::string cellFieldName(const std::string& name) {
     return name + "_cell";
 }
 
+bool isFieldCalled(const std::string& called, const std::string& name, FieldLocation location) {
+    if (called == name) return true;
+    if (location == FieldLocation::point) return called == "point:" + name;
+    const std::string cell = "cell:";
+    return called.starts_with(cell) &&
+           (called.substr(cell.size()) == name || cellFieldName(called.substr(cell.size())) == name);
+}
+
 bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location) {
     if (options.fields.empty()) return true;
-    const auto asked = [&](const std::string& n) {
-        return std::find(options.fields.begin(), options.fields.end(), n) != options.fields.end();
-    };
-    return asked(name) || (location == FieldLocation::cell && asked(cellFieldName(name)));
+    return std::any_of(options.fields.begin(), options.fields.end(), [&](const std::string& called) {
+        return isFieldCalled(called, name, location) ||
+               (location == FieldLocation::cell && called == cellFieldName(name));
+    });
 }
 
 MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& options,

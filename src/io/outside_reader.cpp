@@ -20,15 +20,17 @@ constexpr std::int64_t kChunk = 4096;
 constexpr double kOnPlane = 0x1p-20;  // voxels: what rounding in the transform may move a place by
 
 // Whether the eight voxels around an index are active, but for those without weight.
+// @param rounding how far the transform moved it from its place, in voxels.
 template <class Accessor>
-bool isComplete(const Accessor& accessor, const openvdb::Vec3d& index) {
+bool isComplete(const Accessor& accessor, const openvdb::Vec3d& index, double rounding) {
+    const double onPlane = std::max(kOnPlane, 2 * rounding);
     openvdb::Vec3d base;
     openvdb::Vec3d fraction;
     for (int a = 0; a < 3; ++a) {
         const double whole = std::round(index[a]);
-        base[a] = std::abs(index[a] - whole) < kOnPlane ? whole : std::floor(index[a]);
+        base[a] = std::abs(index[a] - whole) < onPlane ? whole : std::floor(index[a]);
         fraction[a] = std::max(0.0, index[a] - base[a]);
-        if (fraction[a] < kOnPlane) fraction[a] = 0;
+        if (fraction[a] < onPlane) fraction[a] = 0;
     }
     for (int c = 0; c < 8; ++c) {
         if (((c & 1) && fraction[0] == 0) || ((c & 2) && fraction[1] == 0) || ((c & 4) && fraction[2] == 0))
@@ -55,6 +57,7 @@ class OutsideReader {
         std::size_t f = 0;
         for (const OutputField& field : file_.fields) {
             squares_.assign(level_.size(), 0.0);
+            movedSquares_.assign(level_.size(), 0.0);
             for (const GridPlan& plan : planGrids({field})) {
                 for (int level = 0; level < file_.tree.levelCount(); ++level) {
                     const std::string name = gridName(plan.name, file_.layout, level);
@@ -66,9 +69,8 @@ class OutsideReader {
                         read(*openvdb::gridPtrCast<openvdb::FloatGrid>(grid), f, plan, level, reading);
                 }
             }
-            double largest = 0;
-            for (const double square : squares_) largest = std::max(largest, square);
-            reading.max.push_back(std::sqrt(largest));
+            reading.max.push_back(largestRoot(squares_));
+            reading.rounding.push_back(largestRoot(movedSquares_));
             ++f;
         }
         reading.incomplete = std::count(incomplete_.begin(), incomplete_.end(), std::uint8_t(1));
@@ -76,6 +78,20 @@ class OutsideReader {
     }
 
   private:
+    static double largestRoot(const std::vector<double>& squares) {
+        double largest = 0;
+        for (const double square : squares) largest = std::max(largest, square);
+        return std::sqrt(largest);
+    }
+
+    // Where the transform would place a sample in the grid of its level if it were exact. A turned grid has
+    // turned places, not indices.
+    openvdb::Vec3d exactIndex(std::size_t sample, int level) const {
+        const Vec3d index = samples_.placeWorld(sample, file_.tree.originWorld()) /
+                            file_.tree.spacingWorld() * std::ldexp(1.0, -level);
+        return {index.x, index.y, index.z};
+    }
+
     void findPlaces() {
         const ErrorSamples exact(samples_.mesh(), {}, execution_);
         const BrickTree& tree = file_.tree;
@@ -134,7 +150,9 @@ class OutsideReader {
                     const Vec3d place = world * file_.unitScale;
                     const openvdb::Vec3d index = grid.transform().worldToIndex(
                         turned(openvdb::Vec3d(place.x, place.y, place.z), file_.upAxis));
-                    if (!isComplete(accessor, index)) {
+                    const openvdb::Vec3d exact = exactIndex(i, level);
+                    const double moved = (index - exact).length();
+                    if (!isComplete(accessor, index, moved)) {
                         squares_[i] = -1;
                         if (!isFinite) continue;
                         incomplete_[i] = 1;
@@ -148,6 +166,10 @@ class OutsideReader {
                     typename Grid::ValueType value;
                     openvdb::tools::BoxSampler::sample(accessor, index, value);
                     add(i, field, plan, value);
+                    if (moved <= kOnPlane) continue;
+                    typename Grid::ValueType there;
+                    openvdb::tools::BoxSampler::sample(accessor, exact, there);
+                    addMoved(i, value, there);
                 }
             });
     }
@@ -160,6 +182,13 @@ class OutsideReader {
     void add(std::size_t i, const SampledField& field, const GridPlan&, const openvdb::Vec3f& value) {
         const openvdb::Vec3f v = turnedBack(value, file_.upAxis);
         for (int c = 0; c < 3; ++c) addComponent(i, field, c, double(v[c]));
+    }
+    void addMoved(std::size_t i, float value, float exact) {
+        const double difference = double(value) - double(exact);
+        if (std::isfinite(difference)) movedSquares_[i] += difference * difference;
+    }
+    void addMoved(std::size_t i, const openvdb::Vec3f& value, const openvdb::Vec3f& exact) {
+        for (int c = 0; c < 3; ++c) addMoved(i, value[c], exact[c]);
     }
     void addComponent(std::size_t i, const SampledField& field, int component, double value) {
         if (squares_[i] < 0) return;
@@ -177,6 +206,7 @@ class OutsideReader {
     std::vector<std::int32_t> level_;       // by sample: the level whose grid it is read from, or -1
     std::vector<std::uint8_t> incomplete_;  // by sample: it lacks a voxel in some grid
     std::vector<double> squares_;  // by sample: of the differences of one field; below 0 where not finite
+    std::vector<double> movedSquares_;  // by sample: of what the transform's rounding changes of one field
 };
 
 }  // namespace

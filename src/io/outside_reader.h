@@ -13,10 +13,11 @@ namespace tessera {
 
 /// What a program sees that reads a file's grids by OpenVDB's trilinear sampler and knows nothing of Tessera.
 struct OutsideReading {
-    std::int64_t places = 0;      ///< nodes and centroids read
-    std::int64_t incomplete = 0;  ///< of these, beside inactive voxels that should have a value
-    std::vector<double> max;      ///< by field: largest difference to the exact field; Euclidean norm
-    std::string firstProblem;     ///< a place that is incomplete
+    std::int64_t places = 0;       ///< nodes and centroids read
+    std::int64_t incomplete = 0;   ///< of these, beside inactive voxels that should have a value
+    std::vector<double> max;       ///< by field: largest difference to the exact field; Euclidean norm
+    std::vector<double> rounding;  ///< by field: most that the rounding of the file's transforms changes
+    std::string firstProblem;      ///< a place that is incomplete
 };
 
 /// Reads the grids at every node and centroid of the mesh inside the file's bounds: of a flat file at all,

@@ -60,6 +60,10 @@ struct MeshFile {
 /// are left out, and nodes of different parts that lie at exactly one place, with the same values, are one.
 MeshFile readMesh(const std::string& path, const ReadOptions& options, const Execution& execution);
 
+/// Whether a field of this name and place is called so in ReadOptions::fields: by its name, or by
+/// "point:name" or "cell:name", the latter also for a cell field whose name got the suffix "_cell".
+bool isFieldCalled(const std::string& called, const std::string& name, FieldLocation location);
+
 /// readMesh for VTK XML, legacy VTK and TetGen files alone: a program that calls only this starts ten times
 /// faster, as it doesn't load the libraries of other formats. Throws OtherFormatError for those.
 MeshFile readCommonMesh(const std::string& path, const ReadOptions& options, const Execution& execution);

@@ -35,6 +35,9 @@ inline constexpr double kAxisGain = 4.0;
 /// float.
 inline constexpr float kDenormalSteps = 0x1p-96f;
 inline constexpr double kMostFloatSteps = 0x1p22;
+/// From one voxel to the next a value changes by no more than the range of the element's nodes; beyond this a
+/// step may overflow.
+inline constexpr double kWidestFloatRange = 0x1p127;
 /// Larger elements would overflow the offsets, which are computed in double.
 inline constexpr double kLargestElement = 0x1p28;
 /// A scanline's first or last voxel may lie this far outside the element, in voxels.
@@ -69,8 +72,8 @@ struct alignas(64) BatchChannel {
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
     bool finite[kBatch];
-    bool inDouble[kBatch];  // a run's values don't come out right in float: denormal steps, or too many of
-                            // them
+    bool inDouble[kBatch];  // a run's values don't come out right in float: denormal steps, too many of them,
+                            // or steps that overflow
     // Of the element and group of scanlines at work:
     alignas(64) double first[kBatch];  // value at the first voxel of each scanline's run
     float step;                        // difference from voxel to voxel
@@ -271,7 +274,8 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
         channel.high[lane] = high;
         channel.finite[lane] = finite;
         channel.inDouble[lane] = std::max(std::fabs(low), std::fabs(high)) < kDenormalSteps ||
-                                 batch.maxS[lane] - batch.minS[lane] > kMostFloatSteps;
+                                 batch.maxS[lane] - batch.minS[lane] > kMostFloatSteps ||
+                                 double(high) - double(low) >= kWidestFloatRange;
         if (!finite)
             for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
     }
