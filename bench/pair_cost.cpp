@@ -27,6 +27,8 @@
 
 namespace {
 
+namespace counted = tessera::counted;
+namespace stage = tessera::stage;
 using tessera::bench::medianOf;
 
 constexpr int kBlockEdge = 64;
@@ -116,7 +118,7 @@ struct Row {
     double wallMs = 0, processorMs = 0;
     tessera::ResampleStatistics statistics;
 
-    double nsPerPair() const { return wallMs * 1e6 / double(statistics.elementSlicePairs); }
+    double nsPerPair() const { return wallMs * 1e6 / double(statistics.count(counted::elementSlicePairs)); }
     double nsPerActive() const { return wallMs * 1e6 / double(active); }
 };
 
@@ -124,9 +126,10 @@ void printPairs(const Row& row, const Row& smallest) {
     const auto growth = [](double now, double first) { return 100 * (now / first - 1); };
     fmt::print(
         "{:>9} {:<8} {:>10} {:>10} {:>10} {:>8.1f} {:>9.1f} {:>8.2f} {:>+7.1f} % {:>9.2f} {:>+7.1f} %\n",
-        row.elements, row.algorithm, row.statistics.elementSlicePairs, row.active, row.statistics.polygons,
-        row.wallMs, row.processorMs, row.nsPerPair(), growth(row.nsPerPair(), smallest.nsPerPair()),
-        row.nsPerActive(), growth(row.nsPerActive(), smallest.nsPerActive()));
+        row.elements, row.algorithm, row.statistics.count(counted::elementSlicePairs), row.active,
+        row.statistics.count(counted::polygons), row.wallMs, row.processorMs, row.nsPerPair(),
+        growth(row.nsPerPair(), smallest.nsPerPair()), row.nsPerActive(),
+        growth(row.nsPerActive(), smallest.nsPerActive()));
     std::fflush(stdout);
 }
 
@@ -134,9 +137,11 @@ std::string csvOf(const Options& options, const Row& row) {
     const tessera::ResampleStatistics& s = row.statistics;
     return fmt::format(
         "{},{},{},{},{},{},{},{},{:.1f},{:.1f},{:.2f},{:.2f},{},{},{},{},{:.1f},{:.1f},{:.1f}\n",
-        row.elements, row.algorithm, options.points, options.threads, options.runs, s.elementSlicePairs,
-        row.active, s.polygons, row.wallMs, row.processorMs, row.nsPerPair(), row.nsPerActive(), s.vertices,
-        s.fragments, s.uploadBytes, s.readBackBytes, s.binMs, s.generateMs, s.renderMs);
+        row.elements, row.algorithm, options.points, options.threads, options.runs,
+        s.count(counted::elementSlicePairs), row.active, s.count(counted::polygons), row.wallMs,
+        row.processorMs, row.nsPerPair(), row.nsPerActive(), s.count(counted::vertices),
+        s.count(counted::fragments), s.count(counted::uploadBytes), s.count(counted::readBackBytes),
+        s.ms(stage::bin), s.ms(stage::generate), s.ms(stage::render));
 }
 
 void printDeviceCost(const std::vector<Row>& rows) {
@@ -145,7 +150,9 @@ void printDeviceCost(const std::vector<Row>& rows) {
     for (const Row& row : rows) {
         const tessera::ResampleStatistics& s = row.statistics;
         fmt::print("{:>9} {:<8} {:>10} {:>10} {:>12} {:>12} {:>12} {:>10}\n", row.elements, row.algorithm,
-                   s.polygons, s.vertices, s.fragments, s.uploadBytes, s.readBackBytes, s.coveredPoints);
+                   s.count(counted::polygons), s.count(counted::vertices), s.count(counted::fragments),
+                   s.count(counted::uploadBytes), s.count(counted::readBackBytes),
+                   s.count(counted::coveredPoints));
     }
 }
 

@@ -33,7 +33,7 @@ class UniformError {
           execution_(execution),
           samples_(mesh, std::span(&field, 1), execution),
           field_(mesh.fields[std::size_t(field)]),
-          index_(mesh, execution.threads),
+          index_(mesh, execution),
           nearest_(mesh, execution.threads),
           bounds_(mesh.boundsWorld()) {
         for (std::size_t s = 0; s < samples_.count(); ++s)

@@ -355,9 +355,9 @@ TEST(RunTimes, EveryStageIsItsOwnMedian) {
         ResampleStatistics resample(const Lattice&, std::span<const IndexBox>, const BlockSink&,
                                     const Execution&) override {
             ResampleStatistics s;
-            s.polygons = 100;
-            s.binMs = std::array{5.0, 1.0, 3.0, 9.0}[std::size_t(run_)];
-            s.renderMs = std::array{10.0, 30.0, 20.0, 0.0}[std::size_t(run_)];
+            s.add(counted::polygons, 100);
+            s.addMs(stage::bin, std::array{5.0, 1.0, 3.0, 9.0}[std::size_t(run_)]);
+            s.addMs(stage::render, std::array{10.0, 30.0, 20.0, 0.0}[std::size_t(run_)]);
             ++run_;
             return s;
         }
@@ -367,14 +367,14 @@ TEST(RunTimes, EveryStageIsItsOwnMedian) {
     };
     Scripted three, four;
     const RunTimes odd = timeRuns(three, {}, {}, 3, {});
-    EXPECT_EQ(odd.statistics.binMs, 3);
-    EXPECT_EQ(odd.statistics.renderMs, 20);
-    EXPECT_EQ(odd.statistics.polygons, 100);
+    EXPECT_EQ(odd.statistics.ms(stage::bin), 3);
+    EXPECT_EQ(odd.statistics.ms(stage::render), 20);
+    EXPECT_EQ(odd.statistics.count(counted::polygons), 100);
     EXPECT_EQ(odd.runs, 3);
     EXPECT_GE(odd.totalMs, 0);
     const RunTimes even = timeRuns(four, {}, {}, 4, {});
-    EXPECT_EQ(even.statistics.binMs, 4);
-    EXPECT_EQ(even.statistics.renderMs, 15);
+    EXPECT_EQ(even.statistics.ms(stage::bin), 4);
+    EXPECT_EQ(even.statistics.ms(stage::render), 15);
 }
 
 TEST(SamplingGrid, CubicGridStartsAtTheLowerCorner) {

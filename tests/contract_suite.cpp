@@ -170,13 +170,21 @@ std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::
     const auto bound = resampler.bind(mesh, fields, sampling.bind);
     const std::string& target = sampling.bind.target;
     EXPECT_EQ(bound->target(), target.empty() ? resampler.targets().front() : target);
-    bound->resample(lattice, boxes,
-                    [&](std::size_t b, const Block& block) {
-                        const std::lock_guard lock(mutex);
-                        blocks.at(b) = block;
-                        ++calls.at(b);
-                    },
-                    {.threads = sampling.threads});
+    const auto take = [&](std::size_t b, const Block& block) {
+        const std::lock_guard lock(mutex);
+        blocks.at(b) = block;
+        ++calls.at(b);
+    };
+    if (sampling.bind.route == Route::index) {
+        // Each box by a call of its own, several at once.
+        parallelFor({.threads = sampling.threads}, std::int64_t(boxes.size()), [&](std::int64_t b) {
+            bound->resample(lattice, boxes.subspan(std::size_t(b), 1),
+                            [&](std::size_t, const Block& block) { take(std::size_t(b), block); },
+                            {.threads = 1});
+        });
+    } else {
+        bound->resample(lattice, boxes, take, {.threads = sampling.threads});
+    }
     for (const int count : calls) EXPECT_EQ(count, 1) << "every block is given out once";
     return blocks;
 }
@@ -297,28 +305,31 @@ std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& 
     const Block whole = sample(subject, mesh, fields, at.lattice, at.box);
     std::vector<std::string> changed;
     const auto compare = [&](const TetMesh& of, std::span<const IndexBox> boxes, int threads,
-                             const std::string& target, const std::string& what) {
+                             const std::string& target, const std::string& what, Route route) {
         BindOptions bind = subject.bindOptions();
+        bind.route = route;
         if (!target.empty()) bind.target = target;
         std::int64_t count = 0;
         for (const Block& part : sample(resampler, of, fields, at.lattice, boxes, {bind, threads}))
             count += differences(part, whole);
         if (count > 0) changed.push_back(what + ": " + std::to_string(count) + " points differ");
     };
-    compare(mesh, one, 1, {}, "another run");
+    compare(mesh, one, 1, {}, "another run, by the index", Route::index);
     const bool isThorough = !subject.isOnDevice() || (subject.isPrimary && !kIsSanitized && !isHurried());
     for (const int threads : isThorough ? std::vector{2, 5, 16} : std::vector{3})
-        compare(mesh, one, threads, {}, std::to_string(threads) + " threads");
+        compare(mesh, one, threads, {}, std::to_string(threads) + " threads", Route::pass);
     for (const int edge : isThorough ? std::vector{8, 16, 32, 64} : std::vector{16})
-        compare(mesh, cut(at.box, edge), 3, {}, "boxes of " + std::to_string(edge));
+        compare(mesh, cut(at.box, edge), 3, {}, "boxes of " + std::to_string(edge),
+                edge == 16 ? Route::index : Route::pass);
     if (resampler.targetsAgree())
         for (const std::string& target : resampler.targets())
-            compare(mesh, cut(at.box, 19), 2, target, "target " + target);
+            compare(mesh, cut(at.box, 19), 2, target, "target " + target, Route::pass);
 
     std::vector<IndexBox> overlapping = cut(at.box, isThorough ? 9 : 13);
     for (IndexBox& box : overlapping) box = intersect({box.min - 3, box.max + 2}, at.box);
-    compare(mesh, overlapping, 2, {}, "overlapping boxes");
-    compare(withCompany(mesh, at, subject.format), one, 1, {}, "more elements elsewhere");
+    compare(mesh, overlapping, 2, {}, "overlapping boxes, by the index", Route::index);
+    compare(withCompany(mesh, at, subject.format), one, 1, {}, "more elements elsewhere",
+            isThorough ? Route::index : Route::pass);
     return changed;
 }
 

@@ -31,8 +31,9 @@ struct Subject {
     bool isPrimary = true;
     bool isRequired = false;  ///< with TESSERA_REQUIRE_GL=1, to be unavailable is a failure
     std::string name;         ///< "Software", "SlicingOsmesa", "SlicingR8": part of a test's name
+    Route route = Route::pass;
 
-    BindOptions bindOptions() const { return {target, format, Classification::arithmetic}; }
+    BindOptions bindOptions() const { return {target, format, Classification::arithmetic, route, {}}; }
     ContractBounds bounds() const;
     /// Empty when it can run here.
     std::string unavailableReason() const;

@@ -81,7 +81,7 @@ void expectSameBits(const TetMesh& mesh, const Cut& cut, const Resampler& resamp
             }
         }
     EXPECT_EQ(different, 0) << what;
-    EXPECT_EQ(samples.statistics.coveredPoints, covered) << what;
+    EXPECT_EQ(samples.statistics.count(counted::coveredPoints), covered) << what;
 }
 
 TEST_P(EveryResampler, GivesACutTheSameBitsAsTheWholeMeshDoes) {
@@ -184,7 +184,7 @@ TEST(CutPlane, PictureIsTightAroundTheCutAndPixelsAreSquare) {
     TetMesh sampled = mesh;
     addFields(sampled);
     const CutSamples samples = sampleCut(sampled, z, std::vector<int>{0}, findResampler("software"), {}, {});
-    EXPECT_EQ(samples.statistics.coveredPoints, 2500);
+    EXPECT_EQ(samples.statistics.count(counted::coveredPoints), 2500);
 }
 
 TEST_P(EveryResampler, GivesALinearFieldBackOnAnObliquePlane) {

@@ -12,6 +12,6 @@ if(TESSERA_SANITIZE MATCHES address)
   set_tests_properties(hard_cases_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*HardCaseHashes*:HardCaseList*")
 endif()
 if(TARGET CLI11::CLI11)
-  tessera_program(accuracy_table PRECOMPILED tests_precompiled SOURCES hard_cases/accuracy_table.cpp
+  tessera_program(accuracy_table SOURCES hard_cases/accuracy_table.cpp
     LINK reference registry PRIVATE_LINK hard_cases CLI11::CLI11 fmt::fmt GTest::gtest)
 endif()

@@ -40,7 +40,7 @@ TEST_P(SlabRuns, aThousandLeakNeitherObjectsNorMemory) {
     const auto run = [&](int i) {
         const auto sampled = sampleOnce(kAlgorithms[i % 2], mesh, i % 3 ? one : all,
                                         on(GetParam(), kFormats[i / 2 % 4]), lattice, std::span(&box, 1));
-        ASSERT_GT(sampled.statistics.coveredPoints, 400);
+        ASSERT_GT(sampled.statistics.count(counted::coveredPoints), 400);
     };
     constexpr int kRuns = 1000, kWarmUp = 48;
     for (int i = 0; i < kWarmUp; ++i) run(i);
@@ -239,10 +239,15 @@ class BrokenOff {
     void expectUsable(std::string_view after) const {
         const Sampled again = sampleBound(*bound_, lattice_, boxes_);
         EXPECT_EQ(differences(again.blocks, whole_.blocks), 0) << after;
-        EXPECT_EQ(again.statistics.vertices, whole_.statistics.vertices) << after;
-        EXPECT_EQ(again.statistics.uploadBytes, whole_.statistics.uploadBytes) << after;
-        EXPECT_EQ(again.statistics.readBackBytes, whole_.statistics.readBackBytes) << after;
-        EXPECT_EQ(again.statistics.fragments, whole_.statistics.fragments) << after;
+        EXPECT_EQ(again.statistics.count(counted::vertices), whole_.statistics.count(counted::vertices))
+            << after;
+        EXPECT_EQ(again.statistics.count(counted::uploadBytes), whole_.statistics.count(counted::uploadBytes))
+            << after;
+        EXPECT_EQ(again.statistics.count(counted::readBackBytes),
+                  whole_.statistics.count(counted::readBackBytes))
+            << after;
+        EXPECT_EQ(again.statistics.count(counted::fragments), whole_.statistics.count(counted::fragments))
+            << after;
     }
 
   private:

@@ -135,7 +135,7 @@ TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
         },
         execution);
     EXPECT_EQ(calls, (std::vector<int>{1, 1, 1}));
-    EXPECT_EQ(statistics.coveredPoints, 165);  // points with i + j + k <= 8: 11 choose 3
+    EXPECT_EQ(statistics.count(counted::coveredPoints), 165);  // points with i + j + k <= 8: 11 choose 3
 }
 
 TEST(SoftwareResampler, refusesLatticesThatCannotBe) {

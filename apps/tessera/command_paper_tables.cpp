@@ -52,10 +52,10 @@ using Rows = TableRows;
 struct Measured {
     std::string target;
     RunTimes times;
-    double aelMs() const { return times.statistics.binMs + times.statistics.generateMs; }
-    double rndMs() const { return times.statistics.uploadMs + times.statistics.renderMs; }
+    double aelMs() const { return times.statistics.ms(stage::bin) + times.statistics.ms(stage::generate); }
+    double rndMs() const { return times.statistics.ms(stage::upload) + times.statistics.ms(stage::render); }
     /// A resampler without a device has no stages but the list and the rest.
-    bool isStaged() const { return times.statistics.elementSlicePairs > 0; }
+    bool isStaged() const { return times.statistics.count(counted::elementSlicePairs) > 0; }
 };
 
 /// Those of one data set.
@@ -216,15 +216,22 @@ class PaperTables {
                                         ? kNone
                                         : ratio(software->second.times.totalMs, m.times.totalMs);
         if (!m.isStaged())
-            return {"  " + algorithm, seconds(s.binMs), kNone, kNone, seconds(m.times.totalMs), kNone, kNone,
+            return {"  " + algorithm,
+                    seconds(s.ms(stage::bin)),
+                    kNone,
+                    kNone,
+                    seconds(m.times.totalMs),
+                    kNone,
+                    kNone,
                     speedUp};
         return {"  " + algorithm,
                 seconds(m.aelMs()),
                 seconds(m.rndMs()),
-                seconds(s.readBackMs),
+                seconds(s.ms(stage::readBack)),
                 seconds(m.times.totalMs),
-                fmt::format("{:.0f}K", double(s.polygons) / 1000),
-                fmt::format("{:.2f}", double(s.polygons) / double(s.elementSlicePairs)),
+                fmt::format("{:.0f}K", double(s.count(counted::polygons)) / 1000),
+                fmt::format("{:.2f}",
+                            double(s.count(counted::polygons)) / double(s.count(counted::elementSlicePairs))),
                 speedUp};
     }
 
@@ -248,7 +255,7 @@ class PaperTables {
                 {"target", m.target},
                 {"ael_ms", m.aelMs()},
                 {"rnd_ms", m.isStaged() ? Json(m.rndMs()) : Json(nullptr)},
-                {"read_back_ms", m.isStaged() ? Json(m.times.statistics.readBackMs) : Json(nullptr)},
+                {"read_back_ms", m.isStaged() ? Json(m.times.statistics.ms(stage::readBack)) : Json(nullptr)},
                 {"total_ms", m.times.totalMs},
                 {"statistics", statisticsJson(m.times.statistics)}};
         const auto orNull = [](const auto& value) { return value ? Json(*value) : Json(nullptr); };

@@ -267,7 +267,7 @@ int SliceRun::run() {
     timer.restart();
     samples_ = sampleCut(file_.mesh, cut_, selection_.fields, *choice_.resampler, bind_, session_.execution);
     times_.resampleMs = timer.restart();
-    if (samples_.statistics.coveredPoints == 0)
+    if (samples_.statistics.count(counted::coveredPoints) == 0)
         throw InputError(
             fmt::format("{}: no pixel's centre on the plane {} lies in the mesh: nothing to show",
                         arguments_.input, planeText(cut_)));
@@ -295,7 +295,7 @@ void SliceRun::printResult() {
                         times_.readMs, times_.indexMs, times_.queryMs, times_.resampleMs, times_.writeMs);
     text += fmt::format("{}: {} x {} pixels of {:.6g}, plane {}, {} pixels in the mesh\n", arguments_.output,
                         frame.width, frame.height, frame.spacingWorld(), planeText(cut_),
-                        formatCount(samples_.statistics.coveredPoints));
+                        formatCount(samples_.statistics.count(counted::coveredPoints)));
     session_.print(text);
 }
 
@@ -333,7 +333,7 @@ Json SliceRun::report() const {
                      {"u", vectorJson(frame.lattice.uWorld)},
                      {"v", vectorJson(frame.lattice.vWorld)},
                      {"spacing", frame.spacingWorld()},
-                     {"covered_pixels", samples_.statistics.coveredPoints},
+                     {"covered_pixels", samples_.statistics.count(counted::coveredPoints)},
                      {"channels", channels}};
     json["elements"] = {{"total", file_.mesh.elementCount()},
                         {"boxes", cut_.hits.boxes},

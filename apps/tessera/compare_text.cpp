@@ -84,11 +84,12 @@ std::string timesText(const CompareReport& report) {
     const auto ms = [](double value) { return fmt::format("{:.1f}", value); };
     for (const ContestantReport& c : report.contestants) {
         const ResampleStatistics& s = c.times.statistics;
-        const bool staged = s.elementSlicePairs > 0;
+        const bool staged = s.count(counted::elementSlicePairs) > 0;
         const auto stage = [&](double value) { return staged ? ms(value) : std::string("-"); };
         rows.push_back({c.label, ms(c.times.totalMs), fmt::format("{:.2f}", first / c.times.totalMs),
-                        ms(c.bindMs), ms(s.binMs), stage(s.generateMs), stage(s.uploadMs), stage(s.renderMs),
-                        stage(s.readBackMs)});
+                        ms(c.bindMs), ms(s.ms(stage::bin)), stage(s.ms(stage::generate)),
+                        stage(s.ms(stage::upload)), stage(s.ms(stage::render)),
+                        stage(s.ms(stage::readBack))});
     }
     return formatTable(rows);
 }
@@ -98,11 +99,14 @@ std::string countsText(const CompareReport& report) {
                "read back"}};
     for (const ContestantReport& c : report.contestants) {
         const ResampleStatistics& s = c.times.statistics;
-        if (s.elementSlicePairs == 0) continue;
-        rows.push_back({c.label, formatCount(s.elementSlicePairs), formatCount(s.polygons),
-                        fmt::format("{:.3f}", double(s.polygons) / double(s.elementSlicePairs)),
-                        formatCount(s.vertices), formatCount(s.fragments), formatBytes(s.uploadBytes),
-                        formatBytes(s.readBackBytes)});
+        if (s.count(counted::elementSlicePairs) == 0) continue;
+        rows.push_back({c.label, formatCount(s.count(counted::elementSlicePairs)),
+                        formatCount(s.count(counted::polygons)),
+                        fmt::format("{:.3f}", double(s.count(counted::polygons)) /
+                                                  double(s.count(counted::elementSlicePairs))),
+                        formatCount(s.count(counted::vertices)), formatCount(s.count(counted::fragments)),
+                        formatBytes(s.count(counted::uploadBytes)),
+                        formatBytes(s.count(counted::readBackBytes))});
     }
     return rows.size() > 1 ? formatTable(rows) : std::string();
 }

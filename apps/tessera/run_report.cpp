@@ -155,25 +155,10 @@ Json stagesJson(const StageTimes& t) {
             {"verify", t.verifyMs}, {"extend", t.extendMs}, {"write", t.writeMs}};
 }
 
-Json statisticsJson(const ResampleStatistics& s) {
-    Json json{{"element_block_pairs", s.elementBlockPairs},
-              {"exact_elements", s.exactElements},
-              {"scanlines", s.scanlines},
-              {"contested_points", s.contested},
-              {"covered_points", s.coveredPoints},
-              {"bin_ms", s.binMs},
-              {"sample_ms", s.sampleMs}};
-    if (s.elementSlicePairs > 0)
-        json["gl"] = {{"element_slice_pairs", s.elementSlicePairs},
-                      {"polygons", s.polygons},
-                      {"vertices", s.vertices},
-                      {"fragments", s.fragments},
-                      {"upload_bytes", s.uploadBytes},
-                      {"read_back_bytes", s.readBackBytes},
-                      {"generate_ms", s.generateMs},
-                      {"upload_ms", s.uploadMs},
-                      {"render_ms", s.renderMs},
-                      {"read_back_ms", s.readBackMs}};
+Json statisticsJson(const ResampleStatistics& statistics) {
+    Json json = Json::object();
+    for (const auto& [name, value] : statistics.counts()) json[std::string(name)] = value;
+    for (const auto& [name, ms] : statistics.stages()) json[std::string(name)] = ms;
     return json;
 }
 

@@ -30,12 +30,10 @@ RunTimes timeRuns(BoundResampler& resampler, const Lattice& lattice, std::span<c
         totals.push_back(timer.elapsedMs());
     }
     RunTimes result{runs, medianOf(totals), all.back()};
-    for (double ResampleStatistics::*stage :
-         {&ResampleStatistics::binMs, &ResampleStatistics::sampleMs, &ResampleStatistics::generateMs,
-          &ResampleStatistics::uploadMs, &ResampleStatistics::renderMs, &ResampleStatistics::readBackMs}) {
+    for (const auto& [stage, last] : all.back().stages()) {
         std::vector<double> values;
-        for (const ResampleStatistics& s : all) values.push_back(s.*stage);
-        result.statistics.*stage = medianOf(std::move(values));
+        for (const ResampleStatistics& s : all) values.push_back(s.ms(stage));
+        result.statistics.setMs(stage, medianOf(std::move(values)));
     }
     return result;
 }

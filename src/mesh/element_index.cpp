@@ -1,34 +1,397 @@
 #include "mesh/element_index.h"
 
 #include <algorithm>
-
-#include "mesh/box_tree.h"
+#include <cmath>
+#include <cstring>
+#include <limits>
 
 namespace tessera {
 
-struct ElementIndex::Impl {
-    BoxTree tree;
+namespace {
+
+constexpr std::int64_t kChunk = 1 << 13;
+/// Parts that are sorted by themselves before they are merged.
+constexpr std::size_t kSortParts = 8;
+/// Fewer numbers are sorted by comparison.
+constexpr std::size_t kRadixFrom = 512;
+constexpr int kMortonBits = 21;
+/// A place is mapped back with an error of at most this share of the bounds and their distance from the
+/// origin.
+constexpr double kUnmapSlack = 0x1p-48;
+
+struct Keyed {
+    std::uint64_t key;
+    std::int32_t element;
+    bool operator<(const Keyed& other) const {
+        return key != other.key ? key < other.key : element < other.element;
+    }
 };
 
-ElementIndex::ElementIndex(const TetMesh& mesh, int threads) : impl_(std::make_unique<Impl>()) {
-    Execution execution;
-    execution.threads = threads;
-    std::vector<Box3d> boxes(mesh.tets.size());
-    parallelForChunks(execution, mesh.elementCount(), 1 << 14, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t e = begin; e < end; ++e)
-            for (const std::int32_t node : mesh.tets[std::size_t(e)])
-                boxes[std::size_t(e)].include(mesh.points[std::size_t(node)]);
-    });
-    impl_->tree = BoxTree(boxes, execution);
+/// Two zero bits before each of the 21.
+std::uint64_t spread(std::uint64_t x) {
+    x = (x | x << 32) & 0x001f00000000ffffull;
+    x = (x | x << 16) & 0x001f0000ff0000ffull;
+    x = (x | x << 8) & 0x100f00f00f00f00full;
+    x = (x | x << 4) & 0x10c30c30c30c30c3ull;
+    return (x | x << 2) & 0x1249249249249249ull;
 }
 
-ElementIndex::~ElementIndex() = default;
+float roundedDown(double x) {
+    const float f = float(x);
+    return double(f) > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+}
+float roundedUp(double x) {
+    const float f = float(x);
+    return double(f) < x ? std::nextafterf(f, std::numeric_limits<float>::infinity()) : f;
+}
+
+/// Steps in a length of `size`; 0 where it has none to count by.
+float stepsPer(float size) {
+    const float scale = 256 / size;
+    return std::isfinite(scale) ? scale : 0;
+}
+
+Box3d boxOf(const TetMesh& mesh, std::int64_t element) {
+    Box3d box;
+    for (const std::int32_t node : mesh.tets[std::size_t(element)])
+        box.include(mesh.points[std::size_t(node)]);
+    return box;
+}
+
+Box3d boundsOfElements(const TetMesh& mesh, const Execution& execution) {
+    const std::int64_t count = mesh.elementCount();
+    std::vector<Box3d> parts(std::size_t((count + kChunk - 1) / kChunk));
+    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        Box3d box;
+        for (std::int64_t e = begin; e < end; ++e) box.include(boxOf(mesh, e));
+        parts[std::size_t(begin / kChunk)] = box;
+    });
+    Box3d bounds;
+    for (const Box3d& part : parts) bounds.include(part);
+    return bounds;
+}
+
+/// Sorts parts by themselves, then merges neighbours: the order is total, so the result is one and the same.
+void sortKeys(std::vector<Keyed>& keys, const Execution& execution) {
+    std::size_t part = (keys.size() + kSortParts - 1) / kSortParts;
+    const auto at = [&](std::size_t i) { return keys.begin() + std::ptrdiff_t(std::min(i, keys.size())); };
+    parallelFor(execution, kSortParts, [&](std::int64_t p) {
+        const std::size_t begin = std::size_t(p) * part;
+        std::sort(at(begin), at(begin + part));
+    });
+    std::vector<Keyed> merged(keys.size());
+    for (std::size_t parts = kSortParts; parts > 1; parts /= 2, part *= 2) {
+        parallelFor(execution, std::int64_t(parts / 2), [&](std::int64_t p) {
+            const std::size_t begin = std::size_t(p) * 2 * part;
+            std::merge(at(begin), at(begin + part), at(begin + part), at(begin + 2 * part),
+                       merged.begin() + std::ptrdiff_t(std::min(begin, keys.size())));
+        });
+        keys.swap(merged);
+    }
+}
+
+}  // namespace
+
+void sortAscending(std::vector<std::int32_t>& numbers, std::size_t from) {
+    const std::size_t count = numbers.size() - from;
+    std::int32_t* first = numbers.data() + from;
+    if (count < kRadixFrom) {
+        std::sort(first, first + count);
+        return;
+    }
+    constexpr int kBits = 11;
+    constexpr std::size_t kBins = std::size_t(1) << kBits;
+    static thread_local std::vector<std::int32_t> other;
+    other.resize(count);
+    const std::int32_t largest = *std::max_element(first, first + count);
+    std::int32_t *source = first, *target = other.data();
+    for (int shift = 0; shift < 31 && (largest >> shift) != 0; shift += kBits) {
+        std::array<std::uint32_t, kBins> next{};
+        for (std::size_t i = 0; i < count; ++i) ++next[std::size_t(source[i] >> shift) & (kBins - 1)];
+        std::uint32_t sum = 0;
+        for (std::uint32_t& bin : next) {
+            const std::uint32_t size = bin;
+            bin = sum;
+            sum += size;
+        }
+        for (std::size_t i = 0; i < count; ++i)
+            target[next[std::size_t(source[i] >> shift) & (kBins - 1)]++] = source[i];
+        std::swap(source, target);
+    }
+    if (source != first) std::memcpy(first, source, count * sizeof *first);
+}
+
+/// The boxes of one level of nodes, and of the groups below all.
+struct ElementIndex::Builder {
+    const TetMesh& mesh;
+    ElementIndex& index;
+    const Execution& execution;
+
+    void sortElements() {
+        const std::int64_t count = mesh.elementCount();
+        std::vector<Keyed> keys(mesh.tets.size());
+        constexpr double kCells = double(1 << kMortonBits);
+        parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+            for (std::int64_t e = begin; e < end; ++e) {
+                const Box3d box = boxOf(mesh, e);
+                std::uint64_t key = 0;
+                for (int a = 0; a < 3; ++a) {
+                    const double middle = 0.5 * (index.mapped(box.min[a], a) + index.mapped(box.max[a], a));
+                    const double cell = std::clamp(middle * kCells, 0.0, kCells - 1);
+                    key |= spread(std::uint64_t(cell)) << a;
+                }
+                keys[std::size_t(e)] = {key, std::int32_t(e)};
+            }
+        });
+        sortKeys(keys, execution);
+        index.order_.resize(keys.size());
+        for (std::size_t i = 0; i < keys.size(); ++i) index.order_[i] = keys[i].element;
+    }
+
+    MappedBox makeGroup(std::int64_t g) {
+        std::array<MappedBox, kWidth> boxes;
+        MappedBox all = nothing();
+        const std::size_t first = std::size_t(g) * kWidth;
+        const std::size_t size = std::min<std::size_t>(kWidth, index.order_.size() - first);
+        for (std::size_t i = 0; i < size; ++i) {
+            boxes[i] = index.mapped(boxOf(mesh, index.order_[first + i]));
+            include(all, boxes[i]);
+        }
+        Group& group = index.groups_[std::size_t(g)];
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            // Absent elements: low above high.
+            const std::array<std::uint8_t, 6> steps =
+                i < size ? stepsWithin(boxes[i], all) : std::array<std::uint8_t, 6>{255, 255, 255, 0, 0, 0};
+            for (std::size_t a = 0; a < 3; ++a) {
+                group.low[a][i] = steps[a];
+                group.high[a][i] = steps[3 + a];
+            }
+        }
+        return all;
+    }
+
+    template <class BoxOf>
+    std::vector<Node> makeLevel(std::int64_t children, const BoxOf& childBox) {
+        const std::int64_t count = (children + kWidth - 1) / kWidth;
+        std::vector<Node> level{std::size_t(count)};
+        parallelForChunks(execution, count, kChunk / kWidth, [&](std::int64_t begin, std::int64_t end) {
+            for (std::int64_t n = begin; n < end; ++n)
+                for (std::int64_t c = 0; c < kWidth; ++c) {
+                    const std::int64_t below = n * kWidth + c;
+                    const MappedBox box = below < children ? childBox(below) : nothing();
+                    for (std::size_t a = 0; a < 3; ++a) {
+                        level[std::size_t(n)].min[a][std::size_t(c)] = box.min[a];
+                        level[std::size_t(n)].max[a][std::size_t(c)] = box.max[a];
+                    }
+                }
+        });
+        return level;
+    }
+
+    static MappedBox nothing() {
+        constexpr float kInfinity = std::numeric_limits<float>::infinity();
+        MappedBox box;
+        box.min.fill(kInfinity);
+        box.max.fill(-kInfinity);
+        return box;
+    }
+    static void include(MappedBox& box, const MappedBox& other) {
+        for (std::size_t a = 0; a < 3; ++a) {
+            box.min[a] = std::min(box.min[a], other.min[a]);
+            box.max[a] = std::max(box.max[a], other.max[a]);
+        }
+    }
+
+    void build() {
+        sortElements();
+        const std::int64_t groups = (mesh.elementCount() + kWidth - 1) / kWidth;
+        index.groups_.resize(std::size_t(groups));
+        index.levels_.push_back(makeLevel(groups, [&](std::int64_t g) { return makeGroup(g); }));
+        while (index.levels_.back().size() > 1) {
+            const std::vector<Node>& below = index.levels_.back();
+            auto level = makeLevel(std::int64_t(below.size()), [&](std::int64_t n) {
+                MappedBox box = nothing();
+                for (std::size_t c = 0; c < kWidth; ++c) include(box, child(below[std::size_t(n)], c));
+                return box;
+            });
+            index.levels_.push_back(std::move(level));
+        }
+    }
+};
+
+ElementIndex::ElementIndex(const TetMesh& mesh, const Execution& execution) {
+    if (mesh.tets.empty()) return;
+    boundsWorld_ = boundsOfElements(mesh, execution);
+    for (int a = 0; a < 3; ++a) {
+        // Where this isn't a number to count by, everything lies in one place along the axis.
+        const double scale = 1 / (boundsWorld_.max[a] - boundsWorld_.min[a]);
+        scale_[a] = std::isfinite(scale) ? scale : 0;
+    }
+    Builder{mesh, *this, execution}.build();
+}
+
+std::int64_t ElementIndex::memoryBytes() const {
+    std::size_t bytes = order_.size() * sizeof order_[0] + groups_.size() * sizeof groups_[0];
+    for (const auto& level : levels_) bytes += level.size() * sizeof(Node);
+    return std::int64_t(bytes);
+}
+
+// Mapping and rounding never change an order, so boxes that meet still do.
+ElementIndex::MappedBox ElementIndex::mapped(const Box3d& box) const {
+    MappedBox result;
+    for (std::size_t a = 0; a < 3; ++a) {
+        result.min[a] = roundedDown(mapped(box.min[int(a)], int(a)));
+        result.max[a] = roundedUp(mapped(box.max[int(a)], int(a)));
+    }
+    return result;
+}
+
+Box3d ElementIndex::unmapped(const MappedBox& box) const {
+    Box3d result;
+    for (int a = 0; a < 3; ++a) {
+        const double low = boundsWorld_.min[a], high = boundsWorld_.max[a];
+        if (scale_[a] == 0) {
+            result.min[a] = low;
+            result.max[a] = high;
+            continue;
+        }
+        const double size = high - low;
+        const double slack = kUnmapSlack * (std::abs(low) + size);
+        result.min[a] = low + size * double(box.min[std::size_t(a)]) - slack;
+        result.max[a] = low + size * double(box.max[std::size_t(a)]) + slack;
+    }
+    return result;
+}
+
+ElementIndex::MappedBox ElementIndex::child(const Node& node, std::size_t c) {
+    return {{node.min[0][c], node.min[1][c], node.min[2][c]},
+            {node.max[0][c], node.max[1][c], node.max[2][c]}};
+}
+
+ElementIndex::MappedBox ElementIndex::element(const Group& group, std::size_t i, const MappedBox& groupBox) {
+    MappedBox box = groupBox;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const float low = groupBox.min[a], size = groupBox.max[a] - low, step = size * 0x1p-8f;
+        if (stepsPer(size) == 0) continue;
+        // One step more on either side stands above all rounding.
+        box.min[a] = std::max(low, low + (float(group.low[a][i]) - 1) * step);
+        box.max[a] = std::min(groupBox.max[a], low + (float(group.high[a][i]) + 2) * step);
+    }
+    return box;
+}
+
+std::array<std::uint8_t, 6> ElementIndex::stepsWithin(const MappedBox& box, const MappedBox& group) {
+    std::array<std::uint8_t, 6> steps;
+    for (std::size_t a = 0; a < 3; ++a) {
+        const float perStep = stepsPer(group.max[a] - group.min[a]);
+        steps[a] = std::uint8_t(std::clamp((box.min[a] - group.min[a]) * perStep, 0.0f, 255.0f));
+        steps[3 + a] = std::uint8_t(std::clamp((box.max[a] - group.min[a]) * perStep, 0.0f, 255.0f));
+    }
+    return steps;
+}
+
+std::span<const std::int32_t> ElementIndex::elementsBelow(std::size_t level, std::int64_t child) const {
+    std::int64_t span = kWidth;
+    for (std::size_t l = 0; l < level; ++l) span *= kWidth;
+    const std::int64_t first = child * span;
+    return std::span(order_).subspan(std::size_t(first), std::size_t(std::min(span, elementCount() - first)));
+}
+
+bool ElementIndex::clip(const Box3d& boxWorld, MappedBox& box) const {
+    if (levels_.empty()) return false;
+    const Box3d inside{glm::max(boxWorld.min, boundsWorld_.min), glm::min(boxWorld.max, boundsWorld_.max)};
+    if (inside.empty()) return false;
+    box = mapped(inside);
+    return true;
+}
+
+void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box,
+                         std::vector<std::int32_t>& elements) const {
+    const Node& node = levels_[level][std::size_t(n)];
+    for (std::size_t c = 0; c < kWidth; ++c) {
+        bool meets = true, isInside = true;
+        for (std::size_t a = 0; a < 3; ++a) {
+            meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
+            isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
+        }
+        if (!meets) continue;
+        const std::int64_t below = n * kWidth + std::int64_t(c);
+        if (isInside) {
+            const std::span<const std::int32_t> all = elementsBelow(level, below);
+            elements.insert(elements.end(), all.begin(), all.end());
+            continue;
+        }
+        if (level > 0) {
+            query(level - 1, below, box, elements);
+            continue;
+        }
+        const Group& group = groups_[std::size_t(below)];
+        const std::array<std::uint8_t, 6> steps = stepsWithin(box, child(node, c));
+        std::array<bool, kWidth> found;
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            bool each = true;
+            for (std::size_t a = 0; a < 3; ++a)
+                each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
+            found[i] = each;
+        }
+        const std::size_t place = std::size_t(below) * kWidth;
+        for (std::size_t i = 0; i < std::min<std::size_t>(kWidth, order_.size() - place); ++i)
+            if (found[i]) elements.push_back(order_[place + i]);
+    }
+}
+
+std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const MappedBox& box) const {
+    const Node& node = levels_[level][std::size_t(n)];
+    std::int64_t sum = 0;
+    for (std::size_t c = 0; c < kWidth; ++c) {
+        bool meets = true, isInside = true;
+        for (std::size_t a = 0; a < 3; ++a) {
+            meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
+            isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
+        }
+        if (!meets) continue;
+        const std::int64_t below = n * kWidth + std::int64_t(c);
+        if (isInside) {
+            sum += std::int64_t(elementsBelow(level, below).size());
+            continue;
+        }
+        if (level > 0) {
+            sum += count(level - 1, below, box);
+            continue;
+        }
+        const Group& group = groups_[std::size_t(below)];
+        const std::array<std::uint8_t, 6> steps = stepsWithin(box, child(node, c));
+        for (std::size_t i = 0; i < kWidth; ++i) {
+            bool each = true;
+            for (std::size_t a = 0; a < 3; ++a)
+                each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
+            sum += each && std::size_t(below) * kWidth + i < order_.size();
+        }
+    }
+    return sum;
+}
 
 void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements) const {
-    const auto first = std::ptrdiff_t(elements.size());
-    impl_->tree.visitOverlaps(
-        boxWorld, [&](std::int64_t place) { elements.push_back(impl_->tree.order()[std::size_t(place)]); });
-    std::sort(elements.begin() + first, elements.end());
+    MappedBox box;
+    if (!clip(boxWorld, box)) return;
+    const std::size_t first = elements.size();
+    query(levels_.size() - 1, 0, box, elements);
+    sortAscending(elements, first);
+}
+
+std::int64_t ElementIndex::count(const Box3d& boxWorld) const {
+    MappedBox box;
+    return clip(boxWorld, box) ? count(levels_.size() - 1, 0, box) : 0;
+}
+
+const ElementIndex& SharedElementIndex::get(const Execution& execution) const {
+    if (const ElementIndex* built = ifBuilt()) return *built;
+    const std::lock_guard lock(mutex_);
+    if (!index_) {
+        index_ = std::make_unique<const ElementIndex>(*mesh_, execution.withoutProgress());
+        built_.store(index_.get(), std::memory_order_release);
+    }
+    return *index_;
 }
 
 }  // namespace tessera

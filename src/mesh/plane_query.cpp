@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace tessera {
 
 namespace {
-
-constexpr std::int64_t kChunk = 1 << 14;
 
 /// A bound on the rounding of dot(axis, p - centre) for every p in the box: one subtraction, one product and
 /// two sums, each off by 2^-53 of at most |axis| (|p| + |centre|); the bound is four times that.
@@ -17,45 +16,20 @@ double placeRounding(const Box3d& box, const Vec3d& axis, const Vec3d& centre) {
     return 0x1p-49 * glm::dot(glm::abs(axis), reach);
 }
 
-Box3d rootBox(const BoxTree& tree) {
-    Box3d box;
-    if (tree.empty()) return box;
-    const BoxTree::Node& root = tree.node(tree.levelCount() - 1, 0);
-    for (int k = 0; k < 3; ++k) {
-        const auto& low = root.min[std::size_t(k)];
-        const auto& high = root.max[std::size_t(k)];
-        box.min[k] = *std::min_element(low.begin(), low.end());
-        box.max[k] = *std::max_element(high.begin(), high.end());
-    }
-    return box;
-}
-
-std::vector<Box3d> elementBoxes(const TetMesh& mesh, const Execution& execution) {
-    std::vector<Box3d> boxes(mesh.tets.size());
-    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t e = begin; e < end; ++e)
-            for (const std::int32_t node : mesh.tets[std::size_t(e)])
-                boxes[std::size_t(e)].include(mesh.points[std::size_t(node)]);
-    });
-    return boxes;
-}
-
-}  // namespace
-
 /// A plate made ready: how far along each axis a place may lie, with the rounding of its computed distance.
-struct PlaneQuery::Test {
+struct PlateTest {
     const PlanePatch& patch;
     Vec3d limit{0};
 
     bool meets(int axis, double low, double high) const { return low <= limit[axis] && high >= -limit[axis]; }
 
-    bool meetsChild(const BoxTree::Node& node, std::size_t c) const {
+    bool meetsBox(const Box3d& box) const {
         for (int a = 0; a < 3; ++a) {
             const Vec3d& axis = patch.axes[std::size_t(a)];
             double low = 0, high = 0;
             for (int k = 0; k < 3; ++k) {
-                const double toMin = axis[k] * (node.min[std::size_t(k)][c] - patch.centreWorld[k]);
-                const double toMax = axis[k] * (node.max[std::size_t(k)][c] - patch.centreWorld[k]);
+                const double toMin = axis[k] * (box.min[k] - patch.centreWorld[k]);
+                const double toMax = axis[k] * (box.max[k] - patch.centreWorld[k]);
                 low += std::min(toMin, toMax);
                 high += std::max(toMin, toMax);
             }
@@ -76,40 +50,29 @@ struct PlaneQuery::Test {
     }
 };
 
-PlaneQuery::PlaneQuery(const TetMesh& mesh, const Execution& execution)
-    : mesh_(&mesh), tree_(elementBoxes(mesh, execution), execution), boundsWorld_(rootBox(tree_)) {}
+}  // namespace
 
-void PlaneQuery::visit(int level, std::int64_t index, const Test& test, PlaneHits& hits) const {
-    const BoxTree::Node& node = tree_.node(level, index);
-    for (int c = 0; c < BoxTree::kWidth; ++c) {
-        const std::int64_t child = index * BoxTree::kWidth + c;
-        if (level == 0) {
-            if (child >= std::int64_t(tree_.order().size())) break;
-            ++hits.boxes;
-        }
-        // An absent child's box holds infinities of the wrong sign and is never met.
-        if (node.min[0][std::size_t(c)] > node.max[0][std::size_t(c)] ||
-            !test.meetsChild(node, std::size_t(c)))
-            continue;
-        if (level > 0) {
-            visit(level - 1, child, test, hits);
-            continue;
-        }
-        const std::int32_t element = tree_.order()[std::size_t(child)];
-        ++hits.touched;
-        if (test.meetsElement(*mesh_, mesh_->tets[std::size_t(element)])) hits.elements.push_back(element);
-    }
+PlaneQuery::PlaneQuery(std::shared_ptr<const SharedElementIndex> index, const Execution& execution)
+    : index_(std::move(index)) {
+    index_->get(execution);
 }
 
 PlaneHits PlaneQuery::find(const PlanePatch& patch) const {
+    const TetMesh& mesh = index_->mesh();
+    const ElementIndex& index = index_->get();
     PlaneHits hits;
-    if (tree_.empty()) return hits;
-    Test test{patch};
+    if (index.elementCount() == 0) return hits;
+    PlateTest test{patch};
     for (int a = 0; a < 3; ++a)
-        test.limit[a] =
-            patch.halfWorld[a] + placeRounding(boundsWorld_, patch.axes[std::size_t(a)], patch.centreWorld);
-    visit(tree_.levelCount() - 1, 0, test, hits);
-    std::sort(hits.elements.begin(), hits.elements.end());
+        test.limit[a] = patch.halfWorld[a] +
+                        placeRounding(index.boundsWorld(), patch.axes[std::size_t(a)], patch.centreWorld);
+    hits.boxes = index.walk([&](const Box3d& box) { return test.meetsBox(box); },
+                            [&](std::int32_t element) {
+                                ++hits.touched;
+                                if (test.meetsElement(mesh, mesh.tets[std::size_t(element)]))
+                                    hits.elements.push_back(element);
+                            });
+    sortAscending(hits.elements);
     return hits;
 }
 

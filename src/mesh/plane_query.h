@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/execution.h"
-#include "mesh/box_tree.h"
+#include "mesh/element_index.h"
 #include "mesh/tet_mesh.h"
 
 namespace tessera {
@@ -26,15 +26,17 @@ struct PlaneHits {
     std::int64_t touched = 0;            ///< of these, elements whose nodes were then read, hit or not
 };
 
-/// Finds the elements that a plate can meet by a bounding volume hierarchy over the elements' boxes, so a cut
-/// costs time in proportion to what it cuts. Built once a mesh, which must outlive it and stay unchanged;
-/// thread-safe after construction.
+/// Finds the elements that a plate can meet by the mesh's element index, so a cut costs time in proportion to
+/// what it cuts. The mesh must outlive it and stay unchanged; thread-safe after construction.
 class PlaneQuery {
   public:
-    explicit PlaneQuery(const TetMesh& mesh, const Execution& execution = {});
+    /// Builds the index, unless somebody did.
+    explicit PlaneQuery(std::shared_ptr<const SharedElementIndex> index, const Execution& execution = {});
+    explicit PlaneQuery(const TetMesh& mesh, const Execution& execution = {})
+        : PlaneQuery(std::make_shared<const SharedElementIndex>(mesh), execution) {}
 
     /// Box of the elements, world units; empty without elements.
-    const Box3d& boundsWorld() const { return boundsWorld_; }
+    const Box3d& boundsWorld() const { return index_->get().boundsWorld(); }
 
     /// Every element whose extent along each of the plate's axes meets the plate's. No element that meets the
     /// plate by exact arithmetic is missing; beyond those, an element may be there that passes it by (near
@@ -42,12 +44,7 @@ class PlaneQuery {
     PlaneHits find(const PlanePatch& patch) const;
 
   private:
-    struct Test;
-    void visit(int level, std::int64_t index, const Test& test, PlaneHits& hits) const;
-
-    const TetMesh* mesh_;
-    BoxTree tree_;
-    Box3d boundsWorld_;
+    std::shared_ptr<const SharedElementIndex> index_;
 };
 
 /// Extent of the cut of elements with the plane through the patch's centre, along its first two axes and

@@ -1,8 +1,10 @@
 #include "mesh/sub_mesh.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "base/error.h"
+#include "mesh/element_index.h"
 
 namespace tessera {
 
@@ -16,31 +18,103 @@ Field extractField(const Field& field, std::span<const std::int32_t> items) {
     return part;
 }
 
+/// Up to so many corners are numbered by a hash table, more by bits over all nodes.
+constexpr std::size_t kFewCorners = 8192;
+
+/// The nodes of some elements in ascending order, and for each element's corners their places among them.
+class NodeNumbers {
+  public:
+    NodeNumbers(const TetMesh& mesh, std::span<const std::int32_t> elements) {
+        places_.resize(4 * elements.size());
+        for (std::size_t i = 0; i < elements.size(); ++i) {
+            if (i + kAhead < elements.size())
+                __builtin_prefetch(&mesh.tets[std::size_t(elements[i + kAhead])]);
+            const auto& tet = mesh.tets[std::size_t(elements[i])];
+            for (std::size_t k = 0; k < 4; ++k) places_[4 * i + k] = tet[k];
+        }
+        if (places_.size() <= kFewCorners)
+            numberFew();
+        else
+            numberMany();
+    }
+
+    const std::vector<std::int32_t>& nodes() const { return nodes_; }
+    /// Of corner i % 4 of element i / 4.
+    std::int32_t place(std::size_t i) const { return places_[i]; }
+
+  private:
+    static constexpr std::size_t kAhead = 16;
+
+    void numberFew() {
+        struct Slot {
+            std::int32_t node = -1, place = 0;
+        };
+        static thread_local std::vector<Slot> slots;
+        const std::size_t size = std::bit_ceil(2 * places_.size() + 2);
+        slots.assign(size, Slot{});
+        const int shift = 64 - std::countr_zero(size);
+        const auto slotOf = [&](std::int32_t node) -> Slot& {
+            std::size_t at = std::size_t((std::uint64_t(node) * 0x9e3779b97f4a7c15ull) >> shift);
+            while (slots[at].node >= 0 && slots[at].node != node) at = (at + 1) & (size - 1);
+            return slots[at];
+        };
+        for (std::int32_t& node : places_) {
+            Slot& slot = slotOf(node);
+            if (slot.node < 0) {
+                slot.node = node;
+                nodes_.push_back(node);
+            }
+            node = std::int32_t(&slot - slots.data());
+        }
+        sortAscending(nodes_);
+        for (std::size_t i = 0; i < nodes_.size(); ++i) slotOf(nodes_[i]).place = std::int32_t(i);
+        for (std::int32_t& place : places_) place = slots[std::size_t(place)].place;
+    }
+
+    void numberMany() {
+        struct Word {
+            std::uint64_t bits = 0;
+            std::int32_t before = 0;  // nodes of the words before
+        };
+        const auto [least, most] = std::minmax_element(places_.begin(), places_.end());
+        const std::int32_t first = *least;
+        std::vector<Word> words(std::size_t(*most - first) / 64 + 1);
+        for (const std::int32_t node : places_) {
+            const std::size_t bit = std::size_t(node - first);
+            words[bit / 64].bits |= std::uint64_t(1) << bit % 64;
+        }
+        for (std::size_t w = 0; w < words.size(); ++w) {
+            words[w].before = std::int32_t(nodes_.size());
+            for (std::uint64_t bits = words[w].bits; bits != 0; bits &= bits - 1)
+                nodes_.push_back(first + std::int32_t(64 * w) + std::countr_zero(bits));
+        }
+        for (std::int32_t& node : places_) {
+            const std::size_t bit = std::size_t(node - first);
+            const Word& word = words[bit / 64];
+            const std::uint64_t below = (std::uint64_t(1) << bit % 64) - 1;
+            node = word.before + std::popcount(word.bits & below);
+        }
+    }
+
+    std::vector<std::int32_t> places_, nodes_;
+};
+
 }  // namespace
 
 TetMesh extractElements(const TetMesh& mesh, std::span<const std::int32_t> elements,
                         std::span<const int> fields) {
-    std::vector<std::int32_t> nodes;
-    nodes.reserve(4 * elements.size());
     std::int32_t last = -1;
     for (const std::int32_t e : elements) {
         TESSERA_CHECK(e > last && e < mesh.elementCount(), "elements of a part ascend and are in the mesh");
         last = e;
-        nodes.insert(nodes.end(), mesh.tets[std::size_t(e)].begin(), mesh.tets[std::size_t(e)].end());
     }
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-
+    const NodeNumbers numbers(mesh, elements);
+    const std::vector<std::int32_t>& nodes = numbers.nodes();
     TetMesh part;
     part.points.reserve(nodes.size());
     for (const std::int32_t node : nodes) part.points.push_back(mesh.points[std::size_t(node)]);
-    part.tets.reserve(elements.size());
-    for (const std::int32_t e : elements) {
-        auto& tet = part.tets.emplace_back();
-        for (std::size_t i = 0; i < 4; ++i)
-            tet[i] = std::int32_t(std::lower_bound(nodes.begin(), nodes.end(), mesh.tets[std::size_t(e)][i]) -
-                                  nodes.begin());
-    }
+    part.tets.resize(elements.size());
+    for (std::size_t i = 0; i < 4 * elements.size(); ++i) part.tets[i / 4][i % 4] = numbers.place(i);
     for (const int f : fields) {
         const Field& field = mesh.fields[std::size_t(f)];
         part.fields.push_back(extractField(field, field.location == FieldLocation::cell ? elements : nodes));

@@ -16,27 +16,6 @@ std::string_view nameOf(SampleFormat format) {
     return "unknown";
 }
 
-ResampleStatistics& ResampleStatistics::operator+=(const ResampleStatistics& other) {
-    elementBlockPairs += other.elementBlockPairs;
-    exactElements += other.exactElements;
-    scanlines += other.scanlines;
-    contested += other.contested;
-    coveredPoints += other.coveredPoints;
-    binMs += other.binMs;
-    sampleMs += other.sampleMs;
-    elementSlicePairs += other.elementSlicePairs;
-    polygons += other.polygons;
-    vertices += other.vertices;
-    fragments += other.fragments;
-    uploadBytes += other.uploadBytes;
-    readBackBytes += other.readBackBytes;
-    generateMs += other.generateMs;
-    uploadMs += other.uploadMs;
-    renderMs += other.renderMs;
-    readBackMs += other.readBackMs;
-    return *this;
-}
-
 Block resampleBlock(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,
                     const Lattice& lattice, const IndexBox& box, const Execution& execution) {
     Block result;

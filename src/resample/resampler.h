@@ -11,7 +11,9 @@
 
 #include "base/execution.h"
 #include "lattice/block.h"
+#include "mesh/element_index.h"
 #include "mesh/tet_mesh.h"
+#include "resample/statistics.h"
 
 namespace tessera {
 
@@ -27,37 +29,21 @@ enum class Classification {
     published,   ///< as in the paper (2D alpha textures, Gouraud fill): shows what accuracy costs
 };
 
+/// How a bound resampler comes to the elements near its boxes. Samples have the same bits by each.
+enum class Route {
+    automatic,  ///< by the index where the boxes are a small part of the mesh and it is there or pays
+    index,      ///< by the element index: costs what the boxes hold
+    pass,       ///< by a pass over the whole mesh: needs no index
+};
+
 /// What BoundResampler runs with.
 struct BindOptions {
     std::string target;  ///< one of Resampler::targets(); empty: the first
     SampleFormat format = SampleFormat::r32f;
     Classification classification = Classification::arithmetic;
-};
-
-/// What one call to BoundResampler::resample did. Counts are exact; times are wall milliseconds, and stages
-/// may overlap.
-struct ResampleStatistics {
-    std::int64_t elementBlockPairs = 0;  ///< elements that may touch a block or region, summed over them
-    std::int64_t exactElements = 0;      ///< of these, pairs that needed more than double precision
-    std::int64_t scanlines = 0;          ///< scanlines visited
-    std::int64_t contested = 0;          ///< points that more than one element covered
-    std::int64_t coveredPoints = 0;
-    double binMs = 0;     ///< element lists
-    double sampleMs = 0;  ///< everything after, the sink included
-
-    // Of the OpenGL resamplers only.
-    std::int64_t elementSlicePairs = 0;  ///< slices that an element reaches, summed over elements
-    std::int64_t polygons = 0;           ///< substitute or slice polygons, before they are grown
-    std::int64_t vertices = 0;           ///< sent to the device
-    std::int64_t fragments = 0;          ///< shaded, as the device counts them
-    std::int64_t uploadBytes = 0;
-    std::int64_t readBackBytes = 0;
-    double generateMs = 0;  ///< polygons or instances, on the processor
-    double uploadMs = 0;
-    double renderMs = 0;  ///< on the device, by timer queries
-    double readBackMs = 0;
-
-    ResampleStatistics& operator+=(const ResampleStatistics& other);
+    Route route = Route::automatic;
+    /// Of the mesh that is bound, to share it with others; null: one of its own, built when it pays.
+    std::shared_ptr<const SharedElementIndex> index = nullptr;
 };
 
 /// Receives each finished block once: called concurrently from worker threads, in any order; the block lives
@@ -73,7 +59,8 @@ class BoundResampler {
     virtual std::string_view target() const { return "default"; }
 
     /// Samples the boxes of one lattice. Boxes may overlap and lie anywhere. The values and coverage of a
-    /// lattice point depend on the mesh and that point only: not on the boxes, threads or processor. Throws
+    /// lattice point depend on the mesh and that point only: not on the boxes, threads or processor. Costs
+    /// what the boxes hold where they are few (BindOptions::route). Several threads may call at once. Throws
     /// InputError for a lattice that can't be used (spacing not positive and finite, indices beyond 2^30) or
     /// a box of more than 2^31 - 1 points.
     virtual ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,

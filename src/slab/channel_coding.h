@@ -19,6 +19,12 @@ class ChannelCoding {
   public:
     ChannelCoding(const Field& field, int component, SampleFormat format);
 
+    /// The same coding for a part of the field's values.
+    ChannelCoding on(const Field& part) const {
+        ChannelCoding coding = *this;
+        coding.field_ = &part;
+        return coding;
+    }
     const Field& field() const { return *field_; }
     int component() const { return component_; }
     bool isOfCells() const { return field_->location == FieldLocation::cell; }

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
+#include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
 #include "slab/device_samples.h"
 #include "slab/regions.h"
@@ -46,7 +47,7 @@ class BoundSlab : public BoundSlabResampler {
   public:
     BoundSlab(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
               GlPlatform platform, const SliceGenerator& generator)
-        : mesh_(mesh),
+        : mesh_(mesh, fields, routed(options)),
           format_(options.format),
           isPublished_(options.classification == Classification::published),
           platform_(platform),
@@ -55,7 +56,6 @@ class BoundSlab : public BoundSlabResampler {
         if (mesh.elementCount() >= std::int64_t(1) << 30)
             throw InputError("a mesh may have at most 2^30 - 1 elements");
         for (const int f : fields) {
-            TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
             const Field& field = mesh.fields[std::size_t(f)];
             for (int c = 0; c < field.components; ++c) channels_.emplace_back(field, c, format_);
         }
@@ -116,7 +116,8 @@ class BoundSlab : public BoundSlabResampler {
         Block& open(std::size_t box);
         void deliver(std::size_t box);
         /// Frame and axes are set by plan().
-        SlabInputs inputs() const { return {bound_.mesh_, frame_, bound_.channels_, bound_.format_, axes_}; }
+        SlabInputs inputs() const { return {mesh(), frame_, channels_, bound_.format_, axes_}; }
+        const TetMesh& mesh() const { return part_ ? *part_ : bound_.mesh_.whole(); }
 
         const BoundSlab& bound_;
         SlabDevice& device_;
@@ -126,6 +127,8 @@ class BoundSlab : public BoundSlabResampler {
         const Execution& execution_;
         DeviceSamples* kept_;  ///< where samples stay on the device; the sink then gets nothing
 
+        std::optional<TetMesh> part_;          ///< what is near the boxes, where that is little
+        std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
         NodeFrame frame_;
         SliceAxes axes_;
         std::vector<SlabRegion> regions_;
@@ -137,7 +140,13 @@ class BoundSlab : public BoundSlabResampler {
         std::mutex mutex_;
     };
 
-    const TetMesh& mesh_;
+    /// The published methods' results depend on the slice axis, which goes by the whole mesh.
+    static BindOptions routed(BindOptions options) {
+        if (options.classification == Classification::published) options.route = Route::pass;
+        return options;
+    }
+
+    BoundMesh mesh_;
     SampleFormat format_;
     bool isPublished_;
     GlPlatform platform_;
@@ -148,6 +157,13 @@ class BoundSlab : public BoundSlabResampler {
 
 ResampleStatistics BoundSlab::Run::all() {
     Timer timer;
+    part_ = bound_.mesh_.near(lattice_, boxes_, execution_);
+    channels_ = bound_.channels_;
+    if (part_) {
+        std::size_t c = 0;
+        for (const Field& field : part_->fields)
+            for (int k = 0; k < field.components; ++k, ++c) channels_[c] = channels_[c].on(field);
+    }
     if (kept_)
         device_.thread().run([&](GlContext& context) {
             const SlabInputs all = inputs();
@@ -155,7 +171,7 @@ ResampleStatistics BoundSlab::Run::all() {
                 device_.addGroup(context, *kept_, int(all.channelsOf(pass).size()), bound_.format_);
         });
     plan();
-    statistics_.binMs = timer.restart();
+    statistics_.addMs(stage::bin, timer.restart());
     try {
         for (std::size_t r = 0; r < regions_.size(); ++r) {
             execution_.throwIfCancelled();
@@ -179,14 +195,14 @@ ResampleStatistics BoundSlab::Run::all() {
             open(b);
             deliver(b);
         }
-    statistics_.uploadMs = counts.uploadMs;
-    statistics_.renderMs = counts.renderMs;
-    statistics_.readBackMs = counts.readBackMs;
-    statistics_.fragments = counts.fragments;
-    statistics_.vertices = counts.vertices;
-    statistics_.uploadBytes = counts.uploadBytes;
-    statistics_.readBackBytes = counts.readBackBytes;
-    statistics_.sampleMs = timer.elapsedMs();
+    statistics_.addMs(stage::upload, counts.uploadMs);
+    statistics_.addMs(stage::render, counts.renderMs);
+    statistics_.addMs(stage::readBack, counts.readBackMs);
+    statistics_.add(counted::fragments, counts.fragments);
+    statistics_.add(counted::vertices, counts.vertices);
+    statistics_.add(counted::uploadBytes, counts.uploadBytes);
+    statistics_.add(counted::readBackBytes, counts.readBackBytes);
+    statistics_.addMs(stage::sample, timer.elapsedMs());
     return statistics_;
 }
 
@@ -201,10 +217,12 @@ void BoundSlab::Run::plan() {
         regionBoxes.push_back(region.points);
         for (const SlabRegion::Part& part : region.parts) ++partCounts_[part.box];
     }
-    frame_ = frameNodes(bound_.mesh_, lattice_, execution_);
-    axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(bound_.mesh_, frame_, execution_));
-    bins_ = binElements(bound_.mesh_, frame_, regionBoxes, execution_, float(kLargestMargin));
-    statistics_.elementBlockPairs = std::int64_t(bins_.elements.size());
+    frame_ = frameNodes(mesh(), lattice_, execution_);
+    axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
+    bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
+    statistics_.add(counted::elementsNear, mesh().elementCount());
+    statistics_.add(counted::coveredPoints, 0);
+    statistics_.add(counted::elementBlockPairs, std::int64_t(bins_.elements.size()));
 }
 
 void BoundSlab::Run::start(std::size_t region) {
@@ -214,9 +232,9 @@ void BoundSlab::Run::start(std::size_t region) {
     const Timer timer;
     const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
     job.prepared = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
-    statistics_.binMs += timer.elapsedMs();
-    statistics_.exactElements += std::int64_t(job.prepared.hard.size());
-    statistics_.elementSlicePairs += job.prepared.emptyPairs;
+    statistics_.addMs(stage::bin, timer.elapsedMs());
+    statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
+    statistics_.add(counted::elementSlicePairs, job.prepared.emptyPairs);
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
         job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
             device_.begin(context, job.prepared, inputs, pass);
@@ -272,8 +290,8 @@ void BoundSlab::Run::generate(RegionJob& job, std::size_t pass) {
             }
             const std::lock_guard guard(mutex_);
             if (pass == 0) {
-                statistics_.elementSlicePairs += batch->pairs;
-                statistics_.polygons += batch->polygons;
+                statistics_.add(counted::elementSlicePairs, batch->pairs);
+                statistics_.add(counted::polygons, batch->polygons);
             }
             if (inputs.passCount() > 1) job.batches.push_back(batch);
             post(job, std::move(batch));
@@ -285,7 +303,7 @@ void BoundSlab::Run::generate(RegionJob& job, std::size_t pass) {
         job.draws.push_back(
             device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
     }
-    statistics_.generateMs += timer.elapsedMs();
+    statistics_.addMs(stage::generate, timer.elapsedMs());
 }
 
 void BoundSlab::Run::finishOldest() {
@@ -334,7 +352,7 @@ void BoundSlab::Run::copyPart(const SlabRegion& region, const SlabRegion::Part& 
     bool isWhole = false;
     {
         const std::lock_guard lock(mutex_);
-        statistics_.coveredPoints += covered;
+        statistics_.add(counted::coveredPoints, covered);
         isWhole = --blocks_[part.box]->partsLeft == 0;
     }
     if (isWhole) deliver(part.box);

@@ -24,16 +24,17 @@ class RegionGrid {
   public:
     explicit RegionGrid(std::span<const IndexBox> regions) : regions_(regions) {
         bounds_ = regions[0];
-        Vec3i smallest = regions[0].size();
+        Vec3d sum(0);
         for (const IndexBox& region : regions) {
             bounds_.min = glm::min(bounds_.min, region.min);
             bounds_.max = glm::max(bounds_.max, region.max);
-            smallest = glm::min(smallest, region.size());
+            sum += Vec3d(region.size());
         }
+        const Vec3i usual(sum / double(regions.size()));
         std::size_t cells = 1;
         for (int a = 0; a < 3; ++a) {
             const int extent = bounds_.max[a] - bounds_.min[a];
-            const int edge = std::max(smallest[a], (extent + kMostCells - 1) / kMostCells);
+            const int edge = std::max(usual[a], (extent + kMostCells - 1) / kMostCells);
             shift_[a] = std::bit_width(unsigned(edge) - 1);  // a power of two: this runs for every element
             cells_[a] = ((extent - 1) >> shift_[a]) + 1;
             cells *= std::size_t(cells_[a]);

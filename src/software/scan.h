@@ -58,6 +58,13 @@ struct ScanCounts {
     std::int64_t scanlines = 0;
     std::int64_t contested = 0;
     std::int64_t exactElements = 0;
+
+    ScanCounts& operator+=(const ScanCounts& other) {
+        scanlines += other.scanlines;
+        contested += other.contested;
+        exactElements += other.exactElements;
+        return *this;
+    }
 };
 
 /// True when `element`, which covers the point with this rank, owns it rather than the present owner. Updates

@@ -6,9 +6,13 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
+#include <optional>
+#include <utility>
 
 #include "base/error.h"
 #include "base/timer.h"
+#include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
 #include "software/element_bins.h"
 #include "software/scan.h"
@@ -19,6 +23,8 @@ namespace {
 
 constexpr int kLargestRegion = 64, kSmallestRegion = 16;
 constexpr int kRegionsPerThread = 4;
+/// What a bound resampler keeps between calls: so many blocks, none larger.
+constexpr std::size_t kKeptWorks = 4, kKeptBytes = std::size_t(8) << 20;
 /// Blocks in flight may take this much before regions are worked strictly block by block.
 constexpr std::int64_t kReorderLimitBytes = std::int64_t(256) << 20;
 
@@ -30,6 +36,10 @@ struct Work {
     std::size_t rankSize = 0;
     std::vector<float*> channelValues;
     std::atomic<int> regionsLeft{0};
+
+    std::size_t memoryBytes() const {
+        return 4 * block.values.capacity() + block.coverage.capacity() + 4 * owner.capacity() + 8 * rankSize;
+    }
 
     void prepare(const Lattice& lattice, const IndexBox& box, int channels) {
         block.lattice = lattice;
@@ -55,13 +65,20 @@ struct Region {
     IndexBox points;
 };
 
+// Equal parts of about `edge` points: a closed brick of 65 isn't cut.
 void cutIntoRegions(std::size_t box, const IndexBox& points, int edge, std::vector<Region>& regions) {
-    for (int z = points.min.z; z < points.max.z; z += edge)
-        for (int y = points.min.y; y < points.max.y; y += edge)
-            for (int x = points.min.x; x < points.max.x; x += edge) {
-                const Vec3i low{x, y, z};
-                regions.push_back({box, {low, glm::min(low + edge, points.max)}});
-            }
+    if (points.empty()) return;
+    const Vec3i size = points.size();
+    const Vec3i parts = glm::max((size + edge / 2) / edge, Vec3i(1));
+    const auto corner = [&](const Vec3i& part) {
+        Vec3i at;
+        for (int a = 0; a < 3; ++a) at[a] = points.min[a] + int(std::int64_t(size[a]) * part[a] / parts[a]);
+        return at;
+    };
+    Vec3i p;
+    for (p.z = 0; p.z < parts.z; ++p.z)
+        for (p.y = 0; p.y < parts.y; ++p.y)
+            for (p.x = 0; p.x < parts.x; ++p.x) regions.push_back({box, {corner(p), corner(p + 1)}});
 }
 
 // Regions small enough to keep every thread busy; results don't depend on the cut.
@@ -77,18 +94,29 @@ std::vector<Region> planRegions(std::span<const IndexBox> boxes, int threads) {
     return regions;
 }
 
+std::vector<ScanChannel> channelsOf(const TetMesh& mesh, std::span<const int> fields) {
+    std::vector<ScanChannel> channels;
+    for (const int f : fields) {
+        const Field& field = mesh.fields[std::size_t(f)];
+        for (int c = 0; c < field.components; ++c)
+            channels.push_back(
+                {field.values.data(), field.components, c, field.location == FieldLocation::cell});
+    }
+    return channels;
+}
+
+std::vector<int> everyField(const TetMesh& mesh) {
+    std::vector<int> fields(mesh.fields.size());
+    std::iota(fields.begin(), fields.end(), 0);
+    return fields;
+}
+
 class BoundSoftware : public BoundResampler {
   public:
-    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const ScanTarget& target)
-        : mesh_(mesh), target_(target) {
+    BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
+                  const ScanTarget& target)
+        : bound_(mesh, fields, options), target_(target), channels_(channelsOf(mesh, fields)) {
         if (mesh.elementCount() > kElementMask) throw InputError("a mesh may have at most 2^30 - 1 elements");
-        for (const int f : fields) {
-            TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
-            const Field& field = mesh.fields[std::size_t(f)];
-            for (int c = 0; c < field.components; ++c)
-                channels_.push_back(
-                    {field.values.data(), field.components, c, field.location == FieldLocation::cell});
-        }
     }
 
     std::string_view target() const override { return target_.name; }
@@ -102,17 +130,25 @@ class BoundSoftware : public BoundResampler {
         std::vector<IndexBox> regionBoxes;
         regionBoxes.reserve(regions.size());
         for (const Region& region : regions) regionBoxes.push_back(region.points);
-        const NodeFrame frame = frameNodes(mesh_, lattice, execution);
-        const ElementBins bins = binElements(mesh_, frame, regionBoxes, execution);
-        statistics.elementBlockPairs = std::int64_t(bins.elements.size());
-        statistics.binMs = timer.restart();
+        const std::optional<TetMesh> part = bound_.near(lattice, boxes, execution);
+        const TetMesh& mesh = part ? *part : bound_.whole();
+        std::vector<ScanChannel> channels = channels_;
+        if (part) channels = channelsOf(*part, everyField(*part));
+        const NodeFrame frame = frameNodes(mesh, lattice, execution);
+        const ScanInput input{mesh, frame, channels};
+        const ElementBins bins = binElements(mesh, frame, regionBoxes, execution);
+        statistics.add(counted::elementsNear, mesh.elementCount());
+        statistics.add(counted::elementBlockPairs, std::int64_t(bins.elements.size()));
+        statistics.addMs(stage::bin, timer.restart());
+        ScanCounts counts;
+        std::int64_t coveredPoints = 0;
 
         std::vector<std::unique_ptr<Work>> works(boxes.size());
         std::vector<int> regionCounts(boxes.size(), 0);
         for (const Region& region : regions) ++regionCounts[region.box];
         const std::vector<std::size_t> order = workOrder(boxes, regions, bins);
         std::mutex mutex;
-        std::vector<std::unique_ptr<Work>> idle;
+        std::vector<std::unique_ptr<Work>> idle = takeIdle();
         std::atomic<std::int64_t> done{0};
         parallelFor(execution, std::int64_t(regions.size()), [&](std::int64_t i) {
             const std::size_t r = order[std::size_t(i)];
@@ -132,14 +168,12 @@ class BoundSoftware : public BoundResampler {
                 }
                 work = works[box].get();
             }
-            ScanCounts counts;
-            const std::int64_t covered = fillRegion(frame, regions[r].points, bins.of(r), *work, counts);
+            ScanCounts ofRegion;
+            const std::int64_t covered = fillRegion(input, regions[r].points, bins.of(r), *work, ofRegion);
             {
                 std::lock_guard lock(mutex);
-                statistics.scanlines += counts.scanlines;
-                statistics.contested += counts.contested;
-                statistics.exactElements += counts.exactElements;
-                statistics.coveredPoints += covered;
+                counts += ofRegion;
+                coveredPoints += covered;
             }
             if (--work->regionsLeft == 0) {
                 sink(box, work->block);
@@ -155,11 +189,28 @@ class BoundSoftware : public BoundResampler {
             work.prepare(lattice, boxes[b], int(channels_.size()));
             sink(b, work.block);
         }
-        statistics.sampleMs = timer.elapsedMs();
+        keepIdle(std::move(idle));
+        statistics.add(counted::exactElements, counts.exactElements);
+        statistics.add(counted::scanlines, counts.scanlines);
+        statistics.add(counted::contested, counts.contested);
+        statistics.add(counted::coveredPoints, coveredPoints);
+        statistics.addMs(stage::sample, timer.elapsedMs());
         return statistics;
     }
 
   private:
+    // Memory that the last call left, so that one brick after another costs no new pages.
+    std::vector<std::unique_ptr<Work>> takeIdle() {
+        const std::lock_guard lock(idleMutex_);
+        return std::exchange(idle_, {});
+    }
+    void keepIdle(std::vector<std::unique_ptr<Work>> works) {
+        std::erase_if(works, [](const auto& work) { return work->memoryBytes() > kKeptBytes; });
+        if (works.size() > kKeptWorks) works.resize(kKeptWorks);
+        const std::lock_guard lock(idleMutex_);
+        idle_ = std::move(works);
+    }
+
     // The most expensive regions first, so that no thread is left with one at the end; block by block when
     // that would hold too many blocks in memory.
     std::vector<std::size_t> workOrder(std::span<const IndexBox> boxes, const std::vector<Region>& regions,
@@ -175,32 +226,32 @@ class BoundSoftware : public BoundResampler {
         return order;
     }
 
-    std::int64_t fillRegion(const NodeFrame& frame, const IndexBox& region,
+    std::int64_t fillRegion(const ScanInput& input, const IndexBox& region,
                             std::span<const std::int32_t> elements, Work& work, ScanCounts& counts) const {
         const Vec3i size = work.block.box.size();
-        const ScanInput input{mesh_, frame, channels_};
         const ScanOutput output{region,
                                 work.block.box,
                                 {1, size.x, std::int64_t(size.x) * size.y},
                                 work.channelValues,
                                 work.owner.data(),
                                 work.rank.get()};
-        const std::int64_t rowLength = region.size().x;
         const auto forEachRow = [&](const auto& visit) {
+            if (region == work.block.box) return visit(std::int64_t(0), region.count());
             for (int z = region.min.z; z < region.max.z; ++z)
-                for (int y = region.min.y; y < region.max.y; ++y) visit(output.offset({region.min.x, y, z}));
+                for (int y = region.min.y; y < region.max.y; ++y)
+                    visit(output.offset({region.min.x, y, z}), std::int64_t(region.size().x));
         };
-        forEachRow([&](std::int64_t offset) {
-            std::fill_n(output.owner + offset, rowLength, kNoOwner);
-            for (float* values : output.values) std::fill_n(values + offset, rowLength, 0.0f);
+        forEachRow([&](std::int64_t offset, std::int64_t length) {
+            std::fill_n(output.owner + offset, length, kNoOwner);
+            for (float* values : output.values) std::fill_n(values + offset, length, 0.0f);
         });
         target_.scan(input, output, elements, counts);
         std::int64_t covered = 0;
-        forEachRow([&](std::int64_t offset) {
+        forEachRow([&](std::int64_t offset, std::int64_t length) {
             const std::int32_t* owner = output.owner + offset;
             std::uint8_t* coverage = work.block.coverage.data() + offset;
             int inRow = 0;
-            for (std::int64_t i = 0; i < rowLength; ++i) {
+            for (std::int64_t i = 0; i < length; ++i) {
                 coverage[i] = owner[i] >= 0;
                 inRow += coverage[i];
             }
@@ -209,7 +260,9 @@ class BoundSoftware : public BoundResampler {
         return covered;
     }
 
-    const TetMesh& mesh_;
+    std::mutex idleMutex_;
+    std::vector<std::unique_ptr<Work>> idle_;
+    BoundMesh bound_;
     const ScanTarget& target_;
     std::vector<ScanChannel> channels_;
 };
@@ -238,7 +291,7 @@ std::unique_ptr<BoundResampler> SoftwareResampler::bind(const TetMesh& mesh, std
         throw InputError("the software resampler classifies by arithmetic only");
     for (const ScanTarget& candidate : scanTargets())
         if (options.target.empty() || candidate.name == options.target)
-            return std::make_unique<BoundSoftware>(mesh, fields, candidate);
+            return std::make_unique<BoundSoftware>(mesh, fields, options, candidate);
     throw InputError("the software resampler has no target named " + options.target + " on this processor");
 }
 

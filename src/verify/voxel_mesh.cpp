@@ -80,7 +80,7 @@ double VoxelElement::distance(const Vec3d& place) const {
 VoxelMesh::VoxelMesh(const TetMesh& mesh, const Lattice& lattice, int threads)
     : voxels_(inVoxels(mesh, lattice)),
       solid_(mesh.tets.size()),
-      index_(voxels_, threads),
+      index_(voxels_, Execution{.threads = threads}),
       boundary_(voxels_, threads) {
     Execution execution;
     execution.threads = threads;

@@ -202,11 +202,14 @@ TEST_P(HardCaseHashes, AreThoseListed) {
     struct Way {
         std::string target;
         int threads, edge;
+        Route route = Route::pass;
     };
     std::vector<Way> ways;
     for (const std::string& target : software.targets()) ways.push_back({target, 2, 32});
     for (const int threads : {1, 2, 5, 16}) ways.push_back({software.targets().front(), threads, 16});
-    for (const int edge : {8, 64}) ways.push_back({software.targets().front(), 5, edge});
+    for (const int edge : {8, 64})
+        for (const Route route : {Route::pass, Route::index})
+            ways.push_back({software.targets().front(), 5, edge, route});
 
     const std::vector<LatticeCase> coarse = latticesOf(mesh, 16);
     std::vector<LatticeCase> lattices{coarse.front(), coarse.back()};
@@ -217,7 +220,7 @@ TEST_P(HardCaseHashes, AreThoseListed) {
         for (const LatticeCase& at : lattices)
             hash.add(assembled(
                 at, contract::sample(software, mesh, fields, at.lattice, contract::cut(at.box, way.edge),
-                                     {{.target = way.target}, way.threads})));
+                                     {{.target = way.target, .route = way.route}, way.threads})));
         if (first.empty()) first = hash.text();
         EXPECT_EQ(hash.text(), first)
             << way.target << ", " << way.threads << " threads, boxes of " << way.edge;

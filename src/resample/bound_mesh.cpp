@@ -1,0 +1,88 @@
+#include "resample/bound_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "mesh/sub_mesh.h"
+
+namespace tessera {
+
+namespace {
+
+/// No resampler looks further beyond a lattice point.
+constexpr double kMarginVoxels = 0x1p-4;
+/// Building an index takes as long as so many passes over the mesh.
+constexpr int kPassesBeforeIndex = 6;
+/// A pass over the mesh is cheaper than gathering more than this share of it.
+constexpr double kLargestShare = 0.25;
+/// Boxes that fill more of the mesh's bounds aren't worth an index.
+constexpr double kLargestVolumeShare = 0.25;
+
+}  // namespace
+
+Box3d boundsWorld(const Lattice& lattice, const IndexBox& box, double marginVoxels) {
+    Box3d bounds;
+    if (box.empty()) return bounds;
+    const Vec3d low = Vec3d(box.min) - marginVoxels, high = Vec3d(box.max) - 1.0 + marginVoxels;
+    for (int corner = 0; corner < 8; ++corner)
+        bounds.include(lattice.worldFromIndex(
+            {corner & 1 ? high.x : low.x, corner & 2 ? high.y : low.y, corner & 4 ? high.z : low.z}));
+    // Far above the rounding of a corner's three products and sums.
+    const Vec3d farthest = glm::max(glm::abs(low), glm::abs(high));
+    const Vec3d slack =
+        0x1p-49 * (glm::abs(lattice.originWorld) + farthest.x * glm::abs(lattice.uWorld) +
+                   farthest.y * glm::abs(lattice.vWorld) + farthest.z * glm::abs(lattice.wWorld));
+    return {bounds.min - slack, bounds.max + slack};
+}
+
+BoundMesh::BoundMesh(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options)
+    : fields_(fields.begin(), fields.end()),
+      route_(options.route),
+      index_(options.index ? options.index : std::make_shared<const SharedElementIndex>(mesh)),
+      isShared_(options.index != nullptr) {
+    TESSERA_CHECK(&index_->mesh() == &mesh, "the index is of another mesh");
+    for (const int f : fields_) TESSERA_CHECK(f >= 0 && std::size_t(f) < mesh.fields.size(), "no such field");
+}
+
+double BoundMesh::volumeWorld() const {
+    std::call_once(measured_, [&] {
+        Box3d bounds;
+        for (const Vec3d& point : whole().points) bounds.include(point);
+        const Vec3d size = bounds.size();
+        volumeWorld_ = bounds.empty() ? 0 : size.x * size.y * size.z;
+    });
+    return volumeWorld_;
+}
+
+bool BoundMesh::wantsIndex(const Lattice& lattice, std::span<const IndexBox> boxes) const {
+    if (route_ != Route::automatic) return route_ == Route::index;
+    const double voxel = std::abs(glm::dot(lattice.uWorld, glm::cross(lattice.vWorld, lattice.wWorld)));
+    double points = 0;
+    for (const IndexBox& box : boxes) points += double(box.count());
+    if (!(points * voxel <= kLargestVolumeShare * volumeWorld())) return false;
+    return isShared_ || index_->ifBuilt() || passes_.fetch_add(1) >= kPassesBeforeIndex;
+}
+
+std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                       const Execution& execution) const {
+    if (!wantsIndex(lattice, boxes)) return std::nullopt;
+    const ElementIndex& index = index_->get(execution);
+    if (route_ == Route::automatic) {
+        std::int64_t near = 0;
+        const auto most = std::int64_t(kLargestShare * double(index.elementCount()));
+        for (const IndexBox& box : boxes) {
+            near += index.count(boundsWorld(lattice, box, kMarginVoxels));
+            if (near > most) return std::nullopt;
+        }
+    }
+    std::vector<std::int32_t> elements;
+    for (const IndexBox& box : boxes) index.query(boundsWorld(lattice, box, kMarginVoxels), elements);
+    if (boxes.size() > 1) {
+        sortAscending(elements);
+        elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
+    }
+    return extractElements(whole(), elements, fields_);
+}
+
+}  // namespace tessera

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "resample/resampler.h"
+
+namespace tessera {
+
+/// A mesh with the fields that a resampler is bound to, and the elements near boxes of a lattice.
+class BoundMesh {
+  public:
+    BoundMesh(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options);
+
+    const TetMesh& whole() const { return index_->mesh(); }
+    std::span<const int> fields() const { return fields_; }
+
+    /// The elements that can reach the boxes, as a mesh of their own whose fields are the bound ones.
+    /// Elements and nodes keep their order, so samples have the same bits. Null where a pass over the whole
+    /// mesh is to be taken. Several threads may call at once.
+    std::optional<TetMesh> near(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                const Execution& execution) const;
+
+  private:
+    bool wantsIndex(const Lattice& lattice, std::span<const IndexBox> boxes) const;
+    double volumeWorld() const;
+
+    std::vector<int> fields_;
+    Route route_;
+    std::shared_ptr<const SharedElementIndex> index_;
+    bool isShared_;
+    mutable std::once_flag measured_;
+    mutable double volumeWorld_ = 0;      ///< of the box of all nodes
+    mutable std::atomic<int> passes_{0};  ///< for boxes that are a small part of the mesh
+};
+
+/// Holds every place less than `marginVoxels` away from a lattice point of the box, along each lattice axis.
+Box3d boundsWorld(const Lattice& lattice, const IndexBox& box, double marginVoxels);
+
+}  // namespace tessera
