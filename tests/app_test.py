@@ -185,7 +185,7 @@ class BadInput(AppTest):
             ["--layout", "round"], ["--extend", "-1"], ["--extend", "1000"], ["--background", "nan"], ["--unit-scale", "-1"], ["--unit-scale", "0"], ["--unit-scale", "1e31"],
             ["--unit-scale", "1e-31"], ["--background", "1e39"], ["--time-step", "-1"],
             ["--up-axis", "x"], ["--threads", "-1"], ["--threads", "many"], ["--field", ""], ["--field", "f,f"], ["--field", "=x"],
-            ["--algorithm", "magic"], ["--sample-format", "r8"], ["--sample-format", "r64"], ["--gl", "osmesa"], ["--gl", "glx"], ["--classification", "published"], ["--classification", "x"],
+            ["--algorithm", "magic"], ["--sample-format", "r8"], ["--sample-format", "r64"], ["--gl", "osmesa"], ["--gl", "glx"], ["--algorithm", "hybrid-1999"],
             ["--time-step", "-3"], ["--error-field", "f"], ["--nonsense"],
         ):  # fmt: skip
             with self.subTest(options=options):

@@ -15,10 +15,11 @@ namespace tessera {
 /// small meshes.
 class BruteForceResampler : public Resampler {
   public:
-    std::string_view name() const override { return "brute-force"; }
-    std::string_view description() const override { return "point in element, in double"; }
-    double spillBoundVoxels() const override { return 1e-6; }
-    double placeBoundVoxels() const override { return 1e-6; }
+    BruteForceResampler()
+        : Resampler({.name = "brute-force",
+                     .description = "point in element, in double",
+                     .spillBoundVoxels = 1e-6,
+                     .placeBoundVoxels = 1e-6}) {}
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions&) const override {
         return std::make_unique<Bound>(mesh, fields);

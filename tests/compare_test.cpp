@@ -20,14 +20,12 @@ using Edit = std::function<void(Block&)>;
 class EditedResampler : public Resampler {
   public:
     explicit EditedResampler(Edit edit, double boundVoxels = 0)
-        : edit_(std::move(edit)), bound_(boundVoxels) {}
-    std::string_view name() const override { return "edited"; }
-    std::string_view description() const override { return "software, with changes"; }
-    std::vector<SampleFormat> formats() const override {
-        return {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8};
-    }
-    double spillBoundVoxels() const override { return bound_ > 0 ? bound_ : exact().spillBoundVoxels(); }
-    double placeBoundVoxels() const override { return bound_ > 0 ? bound_ : exact().placeBoundVoxels(); }
+        : Resampler({.name = "edited",
+                     .description = "software, with changes",
+                     .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},
+                     .spillBoundVoxels = boundVoxels > 0 ? boundVoxels : exact().info().spillBoundVoxels,
+                     .placeBoundVoxels = boundVoxels > 0 ? boundVoxels : exact().info().placeBoundVoxels}),
+          edit_(std::move(edit)) {}
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions&) const override {
         return std::make_unique<Bound>(exact().bind(mesh, fields), edit_);
@@ -57,7 +55,6 @@ class EditedResampler : public Resampler {
     static const Resampler& exact() { return findResampler("software"); }
 
     Edit edit_;
-    double bound_;
 };
 
 Edit addToValues(const std::function<double(const Vec3i&)>& amount) {

@@ -379,9 +379,14 @@ TEST(Subjects, HaveEveryFormatOnceAndEveryDeviceInTheExactOne) {
     /// Stands for a resampler whose targets are devices, of which this machine has none.
     class OnDevices : public QuantisedResampler {
       public:
-        using QuantisedResampler::QuantisedResampler;
-        std::string_view name() const override { return "on devices"; }
-        bool targetsAgree() const override { return false; }
+        explicit OnDevices(const Resampler& exact) : QuantisedResampler(exact, {}, infoHere(exact)) {}
+        static ResamplerInfo infoHere(const Resampler& exact) {
+            ResamplerInfo info = infoOf(exact, {});
+            info.name = "on devices";
+            info.isOnDevice = true;
+            info.targetsAgree = false;
+            return info;
+        }
         std::vector<std::string> targets() const override { return {}; }
         std::string unavailableReason() const override { return "no device"; }
     };

@@ -55,7 +55,7 @@ bool isAnotherDevice(const Subject& subject) {
 }
 
 ContractBounds Subject::bounds() const {
-    return {resampler->spillBoundVoxels(), resampler->placeBoundVoxels(), format};
+    return {resampler->info().spillBoundVoxels, resampler->info().placeBoundVoxels, format};
 }
 
 std::string Subject::unavailableReason() const {
@@ -98,7 +98,7 @@ constexpr DeviceTarget kDeviceTargets[] = {
 
 std::vector<Subject> subjectsOf(const Resampler& resampler) {
     const std::string name = camel(resampler.name());
-    const bool hasDevices = !resampler.targetsAgree();
+    const bool hasDevices = resampler.info().isOnDevice;
     std::vector<Subject> subjects;
     if (hasDevices && kIsThreadSanitized) return subjects;
     if (hasDevices)
@@ -107,7 +107,7 @@ std::vector<Subject> subjectsOf(const Resampler& resampler) {
                 {&resampler, target, SampleFormat::r32f, subjects.empty(), isRequired, name + camel(target)});
             if (kIsAddressSanitized) break;
         }
-    for (const SampleFormat format : resampler.formats()) {
+    for (const SampleFormat format : resampler.info().formats) {
         if (hasDevices && (format == SampleFormat::r32f || kIsAddressSanitized)) continue;
         const bool isExact = format == SampleFormat::r32f;
         subjects.push_back({&resampler,
@@ -123,6 +123,7 @@ std::vector<Subject> subjectsOf(const Resampler& resampler) {
 std::vector<Subject> subjectsOf(std::span<const Resampler* const> resamplers) {
     std::vector<Subject> all;
     for (const Resampler* resampler : resamplers) {
+        if (!resampler->info().meetsContract) continue;
         const auto subjects = subjectsOf(*resampler);
         all.insert(all.end(), subjects.begin(), subjects.end());
     }
@@ -321,7 +322,7 @@ std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& 
     for (const int edge : isThorough ? std::vector{8, 16, 32, 64} : std::vector{16})
         compare(mesh, cut(at.box, edge), 3, {}, "boxes of " + std::to_string(edge),
                 edge == 16 ? Route::index : Route::pass);
-    if (resampler.targetsAgree())
+    if (resampler.info().targetsAgree)
         for (const std::string& target : resampler.targets())
             compare(mesh, cut(at.box, 19), 2, target, "target " + target, Route::pass);
 

@@ -33,11 +33,11 @@ struct Subject {
     std::string name;         ///< "Software", "SlicingOsmesa", "SlicingR8": part of a test's name
     Route route = Route::pass;
 
-    BindOptions bindOptions() const { return {target, format, Classification::arithmetic, route, {}}; }
+    BindOptions bindOptions() const { return {target, format, route, {}}; }
     ContractBounds bounds() const;
     /// Empty when it can run here.
     std::string unavailableReason() const;
-    bool isOnDevice() const { return !resampler->targetsAgree(); }
+    bool isOnDevice() const { return resampler->info().isOnDevice; }
 };
 /// For listings of tests.
 inline void PrintTo(const Subject& subject, std::ostream* out) {

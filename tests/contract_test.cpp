@@ -87,7 +87,7 @@ TEST_P(ContractOf, RunsTheTargetAskedForAndRefusesOthers) {
 }
 
 TEST_P(ContractOf, OffersTheExactFormatFirstAndRefusesThoseItDoesNotOffer) {
-    const std::vector<SampleFormat> formats = resampler().formats();
+    const std::vector<SampleFormat> formats = resampler().info().formats;
     ASSERT_FALSE(formats.empty());
     EXPECT_EQ(formats.front(), SampleFormat::r32f);
     const TetMesh mesh = boxMesh({});

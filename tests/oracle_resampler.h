@@ -8,10 +8,11 @@ namespace tessera::contract {
 /// lowest index among equals. It shows that the suite accepts a right answer.
 class OracleResampler : public Resampler {
   public:
-    std::string_view name() const override { return "oracle"; }
-    std::string_view description() const override { return "rational arithmetic"; }
-    double spillBoundVoxels() const override { return 0x1p-12; }
-    double placeBoundVoxels() const override { return 0x1p-24; }
+    OracleResampler()
+        : Resampler({.name = "oracle",
+                     .description = "rational arithmetic",
+                     .spillBoundVoxels = 0x1p-12,
+                     .placeBoundVoxels = 0x1p-24}) {}
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
 };

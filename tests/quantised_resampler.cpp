@@ -43,7 +43,9 @@ class BoundQuantised : public BoundResampler {
             const Field& field = mesh.fields[std::size_t(f)];
             for (int c = 0; c < field.components; ++c) ranges_.push_back(rangeOf(field, c));
         }
-        const BindOptions inside{options.target, SampleFormat::r32f, options.classification};
+        BindOptions inside = options;
+        inside.format = SampleFormat::r32f;
+        if (cheat == Cheat::truncatesTwice) inside.index = nullptr;  // of another mesh
         if (cheat != Cheat::truncatesTwice) {
             bound_ = exact.bind(mesh, fields, inside);
             return;
@@ -103,16 +105,13 @@ class BoundQuantised : public BoundResampler {
 
 }  // namespace
 
-std::vector<SampleFormat> QuantisedResampler::formats() const {
-    return {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8};
-}
-
-double QuantisedResampler::spillBoundVoxels() const {
-    return options_.boundVoxels > 0 ? options_.boundVoxels : exact_->spillBoundVoxels();
-}
-
-double QuantisedResampler::placeBoundVoxels() const {
-    return options_.boundVoxels > 0 ? options_.boundVoxels : exact_->placeBoundVoxels();
+ResamplerInfo QuantisedResampler::infoOf(const Resampler& exact, const QuantisedOptions& options) {
+    const double bound = options.boundVoxels;
+    return {.name = "quantised",
+            .description = "values kept in few bits",
+            .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},
+            .spillBoundVoxels = bound > 0 ? bound : exact.info().spillBoundVoxels,
+            .placeBoundVoxels = bound > 0 ? bound : exact.info().placeBoundVoxels};
 }
 
 std::unique_ptr<BoundResampler> QuantisedResampler::bind(const TetMesh& mesh, std::span<const int> fields,

@@ -25,16 +25,16 @@ struct QuantisedOptions {
 class QuantisedResampler : public Resampler {
   public:
     explicit QuantisedResampler(const Resampler& exact, const QuantisedOptions& options = {})
-        : exact_(&exact), options_(options) {}
+        : QuantisedResampler(exact, options, infoOf(exact, options)) {}
 
-    std::string_view name() const override { return "quantised"; }
-    std::string_view description() const override { return "values kept in few bits"; }
     std::vector<std::string> targets() const override { return exact_->targets(); }
-    std::vector<SampleFormat> formats() const override;
-    double spillBoundVoxels() const override;
-    double placeBoundVoxels() const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
+
+  protected:
+    QuantisedResampler(const Resampler& exact, const QuantisedOptions& options, ResamplerInfo info)
+        : Resampler(std::move(info)), exact_(&exact), options_(options) {}
+    static ResamplerInfo infoOf(const Resampler& exact, const QuantisedOptions& options);
 
   private:
     const Resampler* exact_;

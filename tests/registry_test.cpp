@@ -18,19 +18,22 @@ class FakeResampler : public Resampler {
         std::string missing{};  // why it can't run
         std::vector<SampleFormat> formats{SampleFormat::r32f};
         std::vector<std::string> targets{"default"};
-        bool targetsAgree = true;
+        bool targetsAgree = true, meetsContract = true;
         double placeBound = 0x1p-8;
     };
-    explicit FakeResampler(Traits traits) : traits_(std::move(traits)) {}
-    std::string_view name() const override { return traits_.name; }
-    std::string_view description() const override { return "for tests"; }
+    explicit FakeResampler(const Traits& traits)
+        : Resampler({.name = traits.name,
+                     .description = "for tests",
+                     .isOnDevice = !traits.targetsAgree,
+                     .targetsAgree = traits.targetsAgree,
+                     .meetsContract = traits.meetsContract,
+                     .formats = traits.formats,
+                     .spillBoundVoxels = 0x1p-8,
+                     .placeBoundVoxels = traits.placeBound}),
+          traits_(traits) {}
     std::string unavailableReason() const override { return traits_.missing; }
     std::vector<std::string> targets() const override { return traits_.targets; }
-    bool targetsAgree() const override { return traits_.targetsAgree; }
-    std::vector<SampleFormat> formats() const override { return traits_.formats; }
     double relativeCost() const override { return traits_.cost; }
-    double spillBoundVoxels() const override { return 0x1p-8; }
-    double placeBoundVoxels() const override { return traits_.placeBound; }
     std::unique_ptr<BoundResampler> bind(const TetMesh&, std::span<const int>,
                                          const BindOptions&) const override {
         return nullptr;
@@ -48,6 +51,7 @@ const FakeResampler quick({.name = "quick",
                            .targets = {"egl-device", "osmesa"},
                            .targetsAgree = false});
 const FakeResampler absent({.name = "absent", .cost = 0.01, .missing = "no device of that kind"});
+const FakeResampler published({.name = "published", .cost = 0.01, .meetsContract = false});
 const FakeResampler rough({.name = "rough", .cost = 0.01, .placeBound = 0.25});
 
 ResamplerChoice choose(std::vector<const Resampler*> candidates, std::string_view name,
@@ -112,9 +116,14 @@ TEST(Registry, AutoHeedsTheOptions) {
     options = {};
     options.target = "osmesa";
     EXPECT_EQ(choose({&plain, &quick}, "auto", options).resampler, &quick);
-    options = {};
-    options.classification = Classification::published;
-    EXPECT_TRUE(holds(rejection({&plain, &quick}, "auto", options), "contract"));
+}
+
+TEST(Registry, AutoTakesNoMethodAsItWasPublished) {
+    EXPECT_EQ(choose({&published, &plain}, "auto").resampler, &plain);
+    EXPECT_TRUE(holds(rejection({&published}, "auto"), "as it was published"));
+    EXPECT_EQ(choose({&published, &plain}, "published").resampler, &published);
+    for (const char* name : {"slicing-2001", "hybrid-2001"})
+        EXPECT_FALSE(namedResampler(name).info().meetsContract);
 }
 
 TEST(Registry, ANamedOneMustRunAndHaveTheOptions) {

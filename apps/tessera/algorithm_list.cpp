@@ -34,12 +34,9 @@ Contestant contestantOf(const std::string& entry, const AlgorithmArguments& opti
 
 BindOptions bindOptionsFor(const Resampler& resampler, const AlgorithmArguments& arguments) {
     BindOptions options = bindOptions(arguments);
-    // Where every target gives the same bits there are no devices to choose from, and one way to classify.
-    if (resampler.targetsAgree()) {
-        options.target.clear();
-        options.classification = Classification::arithmetic;
-    }
-    const std::vector<SampleFormat> formats = resampler.formats();
+    // Where every target gives the same bits there are no devices to choose from.
+    if (resampler.info().targetsAgree) options.target.clear();
+    const std::vector<SampleFormat>& formats = resampler.info().formats;
     if (std::find(formats.begin(), formats.end(), options.format) == formats.end())
         options.format = formats.front();
     return options;
@@ -49,6 +46,7 @@ AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments&
     AlgorithmList list;
     if (names.empty()) {
         for (const Resampler* resampler : resamplers()) {
+            if (!resampler->info().meetsContract) continue;  // methods as published: only by name
             const std::string reason = whyNotBound(*resampler, bindOptionsFor(*resampler, options));
             if (reason.empty())
                 list.contestants.push_back(contestantOf(std::string(resampler->name()), options));

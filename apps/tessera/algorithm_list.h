@@ -15,9 +15,9 @@ struct AlgorithmList {
     std::vector<std::string> absent;
 };
 
-/// "software,slicing:osmesa": names, each with a target of its own if wanted. Empty: every algorithm that can
-/// run here. OpenGL platform, sample format and classification go to those that have a choice of them. Throws
-/// InputError for a name or target there isn't, or that can't run here.
+/// "software,slicing:osmesa": names, each with a target of its own if wanted. Empty: every algorithm that
+/// meets the contract and can run here. OpenGL platform and sample format go to those that have a choice.
+/// Throws InputError for a name or target there isn't, or that can't run here.
 AlgorithmList listAlgorithms(const std::string& names, const AlgorithmArguments& options);
 
 /// What `resampler` is bound with: the options, as far as it has a choice of them.

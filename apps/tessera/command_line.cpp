@@ -121,13 +121,6 @@ void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
         ->check(CLI::IsMember({"r32f", "r16f", "r16", "r8"}))
         ->capture_default_str()
         ->group(group);
-    command
-        .add_option("--classification", a.classification,
-                    "how an OpenGL resampler decides what an element covers: by arithmetic, which meets the "
-                    "contract, or as the method was published, to see what that costs")
-        ->check(CLI::IsMember({"arithmetic", "published"}))
-        ->capture_default_str()
-        ->group(group);
 }
 
 void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
@@ -478,13 +471,15 @@ void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
                     "leave out grids with more points than this along an axis (there are 128 to 1024)")
         ->check(CLI::Range(128, 1024))
         ->capture_default_str();
+    command.add_flag("--as-published", a.asPublished,
+                     "time slicing-2001 and hybrid-2001, the methods as they were published");
     addCommonOptions(command, a.common);
     command.footer(
         "Times the algorithms on the mesh, its double (mirrored at a plane perpendicular to y) and its "
         "quadruple (y "
         "and z), on the grids of Weiler and\nErtl 2001, and prints their figures 9 to 11 beside.\n"
         "Examples:\n  tessera paper-tables bluntfin.vtu\n"
-        "  tessera paper-tables bluntfin.vtu --classification published --max-size 256 --json tables.json");
+        "  tessera paper-tables bluntfin.vtu --as-published --max-size 256 --json tables.json");
 }
 
 void describe(CLI::App& app, CommandLine& arguments) {

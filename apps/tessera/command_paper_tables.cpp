@@ -112,7 +112,9 @@ class PaperTables {
     /// Algorithms by their names; those that can't run get a reason.
     void findAlgorithm(const std::string& name) {
         for (const Resampler* resampler : resamplers()) {
-            if (resampler->name() != name) continue;
+            const bool isOther = arguments_.asPublished && resampler->name() == name + "-2001";
+            const bool hasOther = arguments_.asPublished && name != "software";
+            if (hasOther ? !isOther : resampler->name() != name) continue;
             const BindOptions options = bindOptionsFor(*resampler, arguments_.algorithm);
             const std::string reason = whyNotBound(*resampler, options);
             if (reason.empty())

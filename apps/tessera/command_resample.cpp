@@ -347,7 +347,7 @@ VdbWriteResult ResampleRun::write(const Step& step, const MeshFile& file, const 
                              .string();
     options.time = source.time;
     // Where every target gives the same bits, naming one would make the file depend on the processor.
-    if (!resampler_.targetsAgree()) options.target = result.target;
+    if (!resampler_.info().targetsAgree) options.target = result.target;
     VdbWriteResult written =
         settings_.format->write(step.output, selection.outputs, result, options, session_.execution);
     times.writeMs = timer.elapsedMs();

@@ -78,7 +78,7 @@ class SliceRun {
           choices_(arguments.fields.empty() ? std::vector<FieldChoice>() : parseFields(arguments.fields)),
           choice_(chooseResampler(arguments.algorithm.name, bind_)),
           session_(arguments.common, arguments.output) {
-        cutOptions_.spillVoxels = choice_.resampler->spillBoundVoxels();
+        cutOptions_.spillVoxels = choice_.resampler->info().spillBoundVoxels;
         if (!choice_.reason.empty()) session_.print(choice_.reason + "\n");
     }
     int run();
@@ -184,7 +184,7 @@ std::vector<ExrAttribute> SliceRun::attributes() const {
         {"tesseraSpacing", cut_.frame.spacingWorld()}};
     if (const std::string repair = encodeRepair(repairOptions(arguments_.repair)); !repair.empty())
         all.push_back({"tesseraRepair", repair});
-    if (!choice_.resampler->targetsAgree()) all.push_back({"tesseraTarget", samples_.target});
+    if (!choice_.resampler->info().targetsAgree) all.push_back({"tesseraTarget", samples_.target});
     if (const std::string format = lossyFormat(bind_); !format.empty())
         all.push_back({"tesseraSampleFormat", format});
     return all;

@@ -201,7 +201,8 @@ VoxelCheck check(const TetMesh& mesh, std::span<const int> fields, VdbFile& file
     stored.flatLevel = file.flatLevel;
     stored.boundsWorld = file.boundsWorld;
     stored.layers = file.layers;
-    stored.bounds = {resampler.spillBoundVoxels(), resampler.placeBoundVoxels(), bind.format, {}, true};
+    stored.bounds = {
+        resampler.info().spillBoundVoxels, resampler.info().placeBoundVoxels, bind.format, {}, true};
     if (file.halfFloat) {
         const std::vector<bool> toHalf = gridsInHalf(file.fields, file.store);
         std::size_t g = 0;

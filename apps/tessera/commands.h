@@ -114,6 +114,7 @@ struct PaperTablesArguments {
     std::string mesh, field;
     AlgorithmArguments algorithm;  ///< its name is not used
     int runs = 3, maxSize = 1024;
+    bool asPublished = false;
 };
 
 /// Each returns the exit code and throws the library's errors.

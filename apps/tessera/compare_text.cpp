@@ -129,7 +129,7 @@ Json contestantJson(const ContestantReport& c, double firstMs) {
     return {{"label", c.label},
             {"target", c.target},
             {"sample_format", nameOf(c.format)},
-            {"classification", c.classification == Classification::arithmetic ? "arithmetic" : "published"},
+            {"meets_contract", c.meetsContract},
             {"spill_bound_voxels", c.spillVoxels},
             {"place_bound_voxels", c.placeVoxels},
             {"check",

@@ -144,7 +144,6 @@ BindOptions bindOptions(const AlgorithmArguments& a) {
     for (const SampleFormat format :
          {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8})
         if (nameOf(format) == a.sampleFormat) options.format = format;
-    if (a.classification == "published") options.classification = Classification::published;
     return options;
 }
 

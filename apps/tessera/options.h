@@ -41,7 +41,7 @@ struct FieldChoice {
 struct AlgorithmArguments {
     std::string name = "software";
     std::string gl;  ///< empty: the first that can be had
-    std::string sampleFormat = "r32f", classification = "arithmetic";
+    std::string sampleFormat = "r32f";
 };
 
 /// --repair and what belongs to it, as typed.

@@ -116,9 +116,9 @@ CompareReport compareResamplers(const TetMesh& mesh, std::span<const int> fields
         result.label = c.label;
         result.target = bound.back()->target();
         result.format = c.options.format;
-        result.classification = c.options.classification;
-        result.spillVoxels = c.resampler->spillBoundVoxels();
-        result.placeVoxels = c.resampler->placeBoundVoxels();
+        result.meetsContract = c.resampler->info().meetsContract;
+        result.spillVoxels = c.resampler->info().spillBoundVoxels;
+        result.placeVoxels = c.resampler->info().placeBoundVoxels;
         result.times = timeRuns(*bound.back(), grid.lattice, boxes, options.runs, quiet);
         report.contestants.push_back(std::move(result));
     }

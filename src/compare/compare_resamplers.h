@@ -30,7 +30,7 @@ struct CompareOptions {
 struct ContestantReport {
     std::string label, target;
     SampleFormat format = SampleFormat::r32f;
-    Classification classification = Classification::arithmetic;
+    bool meetsContract = true;
     double spillVoxels = 0, placeVoxels = 0;
     PointCheck check;
     double bindMs = 0;

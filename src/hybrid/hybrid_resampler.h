@@ -1,6 +1,5 @@
 #pragma once
 
-#include "hybrid/slice_polygon_generator.h"
 #include "slab/slab_resampler.h"
 
 namespace tessera {
@@ -10,18 +9,14 @@ namespace tessera {
 /// of Unstructured Grids, IEEE Visualization 2001, section 5.
 class HybridResampler : public SlabResampler {
   public:
-    std::string_view name() const override { return "hybrid"; }
-    std::string_view description() const override {
-        return "marching-tetrahedra slice polygons filled by OpenGL";
-    }
-    /// It leaves less to the device than substitute geometry does.
-    double relativeCost() const override { return 0.7 * SlabResampler::relativeCost(); }
+    HybridResampler();
+};
 
-  protected:
-    const SliceGenerator& generator() const override { return generator_; }
-
-  private:
-    SlicePolygonGenerator generator_;
+/// The method as it was published: values interpolated over the polygon, points by the fill rule. It loses
+/// points on the boundary.
+class Hybrid2001Resampler : public SlabResampler {
+  public:
+    Hybrid2001Resampler();
 };
 
 }  // namespace tessera

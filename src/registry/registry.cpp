@@ -43,7 +43,7 @@ bool has(const auto& list, const auto& item) {
 
 /// Empty when the resampler has the options, else the rest of a sentence that begins with its name.
 std::string whyNot(const Resampler& resampler, const BindOptions& options, bool checkTarget) {
-    const auto formats = resampler.formats();
+    const auto& formats = resampler.info().formats;
     if (!has(formats, options.format))
         return "samples in " + joined(formats, [](SampleFormat format) { return nameOf(format); }) +
                " only, not in " + std::string(nameOf(options.format));
@@ -57,7 +57,8 @@ std::string whyNot(const Resampler& resampler, const BindOptions& options, bool 
 std::string whyUnfit(const Resampler& resampler, const BindOptions& options) {
     const std::string unavailable = resampler.unavailableReason();
     if (!unavailable.empty()) return "can't run here (" + unavailable + ")";
-    if (resampler.placeBoundVoxels() > kExactEnoughVoxels) return "is not exact enough";
+    if (!resampler.info().meetsContract) return "is a method as it was published";
+    if (resampler.info().placeBoundVoxels > kExactEnoughVoxels) return "is not exact enough";
     return whyNot(resampler, options, true);
 }
 
@@ -67,7 +68,9 @@ std::span<const Resampler* const> resamplers() {
     static const SoftwareResampler software;
     static const SlicingResampler slicing;
     static const HybridResampler hybrid;
-    static const std::array<const Resampler*, 3> all{&software, &slicing, &hybrid};
+    static const Slicing2001Resampler slicing2001;
+    static const Hybrid2001Resampler hybrid2001;
+    static const std::array<const Resampler*, 5> all{&software, &slicing, &hybrid, &slicing2001, &hybrid2001};
     return all;
 }
 
@@ -88,14 +91,10 @@ ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, st
     if (name != "auto") {
         const Resampler& resampler = available(named(candidates, name));
         // Where targets are devices, binding says best why one can't be had.
-        const std::string reason = whyNot(resampler, options, resampler.targetsAgree());
+        const std::string reason = whyNot(resampler, options, resampler.info().targetsAgree);
         if (!reason.empty()) throw InputError("algorithm " + std::string(name) + " " + reason);
         return {&resampler, {}};
     }
-    if (options.classification != Classification::arithmetic)
-        throw InputError(
-            "algorithm auto takes only what meets the contract: name an algorithm for another "
-            "classification");
     ResamplerChoice choice;
     std::vector<std::string> others;
     for (const Resampler* resampler : candidates) {

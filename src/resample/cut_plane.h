@@ -28,7 +28,7 @@ struct CutOptions {
     /// Width and height of the picture, centred on the origin; not given: the cut's own extent.
     std::optional<std::array<double, 2>> sizeWorld;
     int resolution = 1024;  ///< pixels along the longer edge, 1 to kLargestCutResolution
-    /// How far a resampler may cover beyond an element, in voxels: Resampler::spillBoundVoxels().
+    /// How far a resampler may cover beyond an element, in voxels: ResamplerInfo::spillBoundVoxels.
     double spillVoxels = 0x1p-8;
 };
 inline constexpr int kLargestCutResolution = 16384;

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/execution.h"
@@ -23,12 +24,6 @@ enum class SampleFormat { r32f, r16f, r16, r8 };
 /// "r32f", "r16f", "r16", "r8".
 std::string_view nameOf(SampleFormat format);
 
-/// How an OpenGL resampler decides which points an element covers.
-enum class Classification {
-    arithmetic,  ///< by distances computed in the fragment: meets the contract
-    published,   ///< as in the paper (2D alpha textures, Gouraud fill): shows what accuracy costs
-};
-
 /// How a bound resampler comes to the elements near its boxes. Samples have the same bits by each.
 enum class Route {
     automatic,  ///< by the index where the boxes are a small part of the mesh and it is there or pays
@@ -40,7 +35,6 @@ enum class Route {
 struct BindOptions {
     std::string target;  ///< one of Resampler::targets(); empty: the first
     SampleFormat format = SampleFormat::r32f;
-    Classification classification = Classification::arithmetic;
     Route route = Route::automatic;
     /// Of the mesh that is bound, to share it with others; null: one of its own, built when it pays.
     std::shared_ptr<const SharedElementIndex> index = nullptr;
@@ -67,35 +61,50 @@ class BoundResampler {
                                         const BlockSink& sink, const Execution& execution) = 0;
 };
 
-/// One resampling algorithm. Every one meets the contract in docs/algorithms.md: no holes, no spill beyond
-/// spillBoundVoxels(), no overshoot, bounded error, the same bits always.
+/// What an algorithm is and can do.
+struct ResamplerInfo {
+    std::string name;         ///< as on the command line, e.g. "software"
+    std::string description;  ///< one line
+    /// Its targets are graphics devices or drivers, and its samples can stay there.
+    bool isOnDevice = false;
+    /// All targets give the same bits. Not so where each is a device of its own.
+    bool targetsAgree = true;
+    /// Whether it meets the contract in docs/algorithms.md: no holes, no spill, no overshoot, bounded error,
+    /// the same bits always. False for methods as they were published, which show what accuracy costs: they
+    /// are taken only by name.
+    bool meetsContract = true;
+    /// Formats it can sample in, the exact one first.
+    std::vector<SampleFormat> formats{SampleFormat::r32f};
+    /// Largest true distance from the mesh, in voxels, at which a point may be covered (contract clause 2).
+    double spillBoundVoxels = 0;
+    /// Distance in voxels within which the interpolated place may differ from the lattice point (contract
+    /// clause 4).
+    double placeBoundVoxels = 0;
+};
+
+/// One resampling algorithm.
 class Resampler {
   public:
+    explicit Resampler(ResamplerInfo info) : info_(std::move(info)) {}
     virtual ~Resampler() = default;
-    virtual std::string_view name() const = 0;         ///< as on the command line, e.g. "software"
-    virtual std::string_view description() const = 0;  ///< one line
+    const ResamplerInfo& info() const { return info_; }
+    const std::string& name() const { return info_.name; }
     /// Empty when this machine can run it, else the reason why not.
     virtual std::string unavailableReason() const { return {}; }
     /// Code paths this processor or driver offers, the default first: "AVX3", "AVX2", "SSE4", or
     /// "egl-device", "egl-surfaceless", "osmesa".
     virtual std::vector<std::string> targets() const { return {"default"}; }
-    /// All targets give the same bits. Not so where each is a device of its own.
-    virtual bool targetsAgree() const { return true; }
-    /// Formats it can sample in, the exact one first.
-    virtual std::vector<SampleFormat> formats() const { return {SampleFormat::r32f}; }
     /// Time that sampling takes on this machine as a multiple of the software resampler's: a rough guess, for
     /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow. Asked
     /// only when unavailableReason() is empty.
     virtual double relativeCost() const { return 1; }
-    /// Largest true distance from the mesh, in voxels, at which a point may be covered (contract clause 2).
-    virtual double spillBoundVoxels() const = 0;
-    /// Distance in voxels within which the interpolated place may differ from the lattice point (contract
-    /// clause 4).
-    virtual double placeBoundVoxels() const = 0;
     /// @param fields indices into mesh.fields; channels of the blocks are their components, in this order.
     /// Throws InputError for options that it doesn't have.
     virtual std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                                  const BindOptions& options = {}) const = 0;
+
+  private:
+    ResamplerInfo info_;
 };
 
 /// Convenience for single use: samples one box into one block.

@@ -46,10 +46,10 @@ struct RegionJob {
 class BoundSlab : public BoundSlabResampler {
   public:
     BoundSlab(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
-              GlPlatform platform, const SliceGenerator& generator)
-        : mesh_(mesh, fields, routed(options)),
+              GlPlatform platform, const SliceGenerator& generator, bool isPublished)
+        : mesh_(mesh, fields, routed(options, isPublished)),
           format_(options.format),
-          isPublished_(options.classification == Classification::published),
+          isPublished_(isPublished),
           platform_(platform),
           target_(nameOf(platform)),
           generator_(generator) {
@@ -141,8 +141,8 @@ class BoundSlab : public BoundSlabResampler {
     };
 
     /// The published methods' results depend on the slice axis, which goes by the whole mesh.
-    static BindOptions routed(BindOptions options) {
-        if (options.classification == Classification::published) options.route = Route::pass;
+    static BindOptions routed(BindOptions options, bool isPublished) {
+        if (isPublished) options.route = Route::pass;
         return options;
     }
 
@@ -418,6 +418,20 @@ void BoundSlab::Run::copyChannels(const SlabRegion& region, const SlabRegion::Pa
 
 }  // namespace
 
+SlabResampler::SlabResampler(std::string name, std::string description, Method method,
+                             std::unique_ptr<const SliceGenerator> generator, double cost)
+    : Resampler({.name = std::move(name),
+                 .description = std::move(description),
+                 .isOnDevice = true,
+                 .targetsAgree = false,
+                 .meetsContract = method == Method::arithmetic,
+                 .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},
+                 .spillBoundVoxels = 0x1p-8,
+                 .placeBoundVoxels = 0x1p-8}),
+      method_(method),
+      generator_(std::move(generator)),
+      cost_(cost) {}
+
 std::string SlabResampler::unavailableReason() const {
     if (!availableGlPlatforms().empty()) return {};
     std::string reasons;
@@ -428,17 +442,13 @@ std::string SlabResampler::unavailableReason() const {
 }
 
 double SlabResampler::relativeCost() const {
-    return glDeviceInfo(chooseGlPlatform()).isSoftware ? kEmulatedCost : kDeviceCost;
+    return cost_ * (glDeviceInfo(chooseGlPlatform()).isSoftware ? kEmulatedCost : kDeviceCost);
 }
 
 std::vector<std::string> SlabResampler::targets() const {
     std::vector<std::string> names;
     for (const GlPlatform platform : availableGlPlatforms()) names.emplace_back(nameOf(platform));
     return names;
-}
-
-std::vector<SampleFormat> SlabResampler::formats() const {
-    return {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8};
 }
 
 std::unique_ptr<BoundResampler> SlabResampler::bind(const TetMesh& mesh, std::span<const int> fields,
@@ -451,7 +461,8 @@ std::unique_ptr<BoundSlabResampler> SlabResampler::bindToDevice(const TetMesh& m
                                                                 const BindOptions& options) const {
     std::optional<GlPlatform> wanted;
     if (!options.target.empty()) wanted = parseGlPlatform(options.target);
-    return std::make_unique<BoundSlab>(mesh, fields, options, chooseGlPlatform(wanted), generator());
+    return std::make_unique<BoundSlab>(mesh, fields, options, chooseGlPlatform(wanted), *generator_,
+                                       method_ == Method::published);
 }
 
 }  // namespace tessera

@@ -28,11 +28,7 @@ class SlabResampler : public Resampler {
   public:
     std::string unavailableReason() const override;
     std::vector<std::string> targets() const override;
-    bool targetsAgree() const override { return false; }
-    std::vector<SampleFormat> formats() const override;
     double relativeCost() const override;
-    double spillBoundVoxels() const override { return 0x1p-8; }
-    double placeBoundVoxels() const override { return 0x1p-8; }
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
 
@@ -41,7 +37,19 @@ class SlabResampler : public Resampler {
                                                      const BindOptions& options = {}) const;
 
   protected:
-    virtual const SliceGenerator& generator() const = 0;
+    /// How the points that an element covers are decided.
+    enum class Method {
+        arithmetic,  ///< by distances computed in the fragment: meets the contract
+        published,   ///< as in the paper: 2D alpha textures, Gouraud fill
+    };
+    /// @param cost share of what a device usually takes.
+    SlabResampler(std::string name, std::string description, Method method,
+                  std::unique_ptr<const SliceGenerator> generator, double cost = 1);
+
+  private:
+    Method method_;
+    std::unique_ptr<const SliceGenerator> generator_;
+    double cost_;
 };
 
 }  // namespace tessera

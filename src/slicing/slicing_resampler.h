@@ -1,7 +1,6 @@
 #pragma once
 
 #include "slab/slab_resampler.h"
-#include "slicing/silhouette_generator.h"
 
 namespace tessera {
 
@@ -10,16 +9,14 @@ namespace tessera {
 /// of Unstructured Grids, IEEE Visualization 2001, section 3.
 class SlicingResampler : public SlabResampler {
   public:
-    std::string_view name() const override { return "slicing"; }
-    std::string_view description() const override {
-        return "substitute geometry on OpenGL, a distance test for every fragment";
-    }
+    SlicingResampler();
+};
 
-  protected:
-    const SliceGenerator& generator() const override { return generator_; }
-
-  private:
-    SilhouetteGenerator generator_;
+/// The method as it was published: interpolated barycentric coordinates, two lookups in an alpha texture. It
+/// loses points on shared faces.
+class Slicing2001Resampler : public SlabResampler {
+  public:
+    Slicing2001Resampler();
 };
 
 }  // namespace tessera

@@ -275,20 +275,17 @@ std::vector<std::string> SoftwareResampler::targets() const {
     return names;
 }
 
-double SoftwareResampler::spillBoundVoxels() const {
-    return 0x1p-12;
-}
-double SoftwareResampler::placeBoundVoxels() const {
-    return 0x1p-24;
-}
+SoftwareResampler::SoftwareResampler()
+    : Resampler({.name = "software",
+                 .description = "scanline walk on the processor, exact coverage",
+                 .spillBoundVoxels = 0x1p-12,
+                 .placeBoundVoxels = 0x1p-24}) {}
 
 std::unique_ptr<BoundResampler> SoftwareResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                         const BindOptions& options) const {
     if (options.format != SampleFormat::r32f)
         throw InputError("the software resampler samples in r32f only, not in " +
                          std::string(nameOf(options.format)));
-    if (options.classification != Classification::arithmetic)
-        throw InputError("the software resampler classifies by arithmetic only");
     for (const ScanTarget& candidate : scanTargets())
         if (options.target.empty() || candidate.name == options.target)
             return std::make_unique<BoundSoftware>(mesh, fields, options, candidate);

@@ -9,11 +9,8 @@ namespace tessera {
 /// of Unstructured Grids, IEEE Visualization 2001, section 4.
 class SoftwareResampler : public Resampler {
   public:
-    std::string_view name() const override { return "software"; }
-    std::string_view description() const override { return "scanline walk on the processor, exact coverage"; }
+    SoftwareResampler();
     std::vector<std::string> targets() const override;
-    double spillBoundVoxels() const override;
-    double placeBoundVoxels() const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
 };

@@ -14,8 +14,8 @@ namespace tessera {
 
 /// What the samples of one algorithm are held to.
 struct SampleBounds {
-    double spillVoxels = 0;  ///< Resampler::spillBoundVoxels()
-    double placeVoxels = 0;  ///< Resampler::placeBoundVoxels()
+    double spillVoxels = 0;  ///< ResamplerInfo::spillBoundVoxels
+    double placeVoxels = 0;  ///< ResamplerInfo::placeBoundVoxels
     SampleFormat format = SampleFormat::r32f;
     std::vector<std::uint8_t> isHalf;  ///< by channel: values were rounded to half floats; empty: none
     bool wholeVectors = false;  ///< a component that isn't finite takes the other two of a vector with it
