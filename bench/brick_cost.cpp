@@ -25,6 +25,7 @@
 #include "reference/generators.h"
 #include "reference/random.h"
 #include "registry/registry.h"
+#include "resample/stoppable_sampling.h"
 
 namespace {
 
@@ -101,6 +102,29 @@ double quantile(std::vector<double> values, double share) {
     return values[std::min(values.size() - 1, std::size_t(share * double(values.size())))];
 }
 
+/// One coarse brick in steps of a millisecond, as between two frames.
+void measureSteps(const TetMesh& mesh, const std::shared_ptr<const tessera::SharedElementIndex>& index,
+                  tessera::BoundResampler& bound, const tessera::Execution& one) {
+    constexpr double kElements = 1e5;
+    const std::vector<Brick> bricks = drawBricks(mesh, index->get(), 16, kElements, 10);
+    std::vector<double> steps;
+    for (const Brick& brick : bricks) {
+        tessera::StoppableSampling sampling(bound, index, brick.lattice, std::span(&brick.box, 1),
+                                            [](std::size_t, const tessera::Block&) {});
+        while (!sampling.isDone()) {
+            tessera::Timer timer;
+            sampling.advance(std::chrono::steady_clock::now() + std::chrono::milliseconds(1), one);
+            steps.push_back(timer.elapsedMs());
+        }
+    }
+    if (!steps.empty())
+        fmt::print(
+            "  bricks of 17^3 points with {:.0f} elements, stopped after 1 ms: {:.0f} steps a brick, median "
+            "{:.2f} ms, 99 % {:.2f} ms\n",
+            kElements, double(steps.size()) / double(bricks.size()), quantile(steps, 0.5),
+            quantile(steps, 0.99));
+}
+
 void measure(const Options& options, const std::string& name, const TetMesh& mesh) {
     tessera::Execution many;
     many.threads = options.indexThreads;
@@ -158,6 +182,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
                        1000 * median / std::max(1.0, pairs));
             std::fflush(stdout);
         }
+        measureSteps(mesh, shared, *bound, one);
     }
 }
 

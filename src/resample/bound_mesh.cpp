@@ -10,8 +10,6 @@ namespace tessera {
 
 namespace {
 
-/// No resampler looks further beyond a lattice point.
-constexpr double kMarginVoxels = 0x1p-4;
 /// Building an index takes as long as so many passes over the mesh.
 constexpr int kPassesBeforeIndex = 6;
 /// A pass over the mesh is cheaper than gathering more than this share of it.
@@ -72,12 +70,12 @@ std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const I
         std::int64_t near = 0;
         const auto most = std::int64_t(kLargestShare * double(index.elementCount()));
         for (const IndexBox& box : boxes) {
-            near += index.count(boundsWorld(lattice, box, kMarginVoxels));
+            near += index.count(boundsWorld(lattice, box, kNearMarginVoxels));
             if (near > most) return std::nullopt;
         }
     }
     std::vector<std::int32_t> elements;
-    for (const IndexBox& box : boxes) index.query(boundsWorld(lattice, box, kMarginVoxels), elements);
+    for (const IndexBox& box : boxes) index.query(boundsWorld(lattice, box, kNearMarginVoxels), elements);
     if (boxes.size() > 1) {
         sortAscending(elements);
         elements.erase(std::unique(elements.begin(), elements.end()), elements.end());

@@ -11,6 +11,9 @@
 
 namespace tessera {
 
+/// No resampler looks for elements further than this beyond a lattice point.
+inline constexpr double kNearMarginVoxels = 0x1p-4;
+
 /// A mesh with the fields that a resampler is bound to, and the elements near boxes of a lattice.
 class BoundMesh {
   public:

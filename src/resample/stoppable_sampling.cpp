@@ -1,0 +1,91 @@
+#include "resample/stoppable_sampling.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "resample/bound_mesh.h"
+#include "resample/check_lattice.h"
+
+namespace tessera {
+
+namespace {
+
+/// A piece with no more elements near it, or no more points, isn't cut.
+constexpr std::int64_t kPieceElements = 1024;
+constexpr std::int64_t kPiecePoints = 32 * 32 * 32;
+
+}  // namespace
+
+StoppableSampling::StoppableSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
+                                     const Lattice& lattice, std::span<const IndexBox> boxes, BlockSink sink)
+    : bound_(bound),
+      index_(std::move(index)),
+      lattice_(lattice),
+      boxes_(boxes.begin(), boxes.end()),
+      sink_(std::move(sink)) {
+    checkLattice(lattice, boxes);
+}
+
+// Cuts the next piece until few elements are near it.
+void StoppableSampling::cutNext(const ElementIndex& index) {
+    while (true) {
+        const IndexBox piece = pieces_.back();
+        const Vec3i size = piece.size();
+        const int longest = std::max({size.x, size.y, size.z});
+        if (longest <= 1 || (piece.count() <= kPiecePoints &&
+                             index.count(boundsWorld(lattice_, piece, kNearMarginVoxels)) <= kPieceElements))
+            return;
+        // Memory runs along x.
+        const int axis = size.z == longest ? 2 : size.y == longest ? 1 : 0;
+        IndexBox low = piece, high = piece;
+        low.max[axis] = high.min[axis] = piece.min[axis] + longest / 2;
+        pieces_.back() = high;
+        pieces_.push_back(low);
+    }
+}
+
+void StoppableSampling::begin() {
+    block_ = {};
+    block_.lattice = lattice_;
+    block_.box = boxes_[box_];
+    pieces_ = {boxes_[box_]};
+    hasBegun_ = true;
+}
+
+void StoppableSampling::copy(const Block& piece) {
+    if (block_.coverage.empty()) {
+        block_.channels = piece.channels;
+        block_.values.assign(block_.count() * std::size_t(piece.channels), 0.0f);
+        block_.coverage.assign(block_.count(), 0);
+    }
+    const int length = piece.box.size().x;
+    Vec3i p = piece.box.min;
+    for (p.z = piece.box.min.z; p.z < piece.box.max.z; ++p.z)
+        for (p.y = piece.box.min.y; p.y < piece.box.max.y; ++p.y) {
+            const std::size_t from = piece.offset(p), to = block_.offset(p);
+            std::copy_n(piece.coverage.data() + from, length, block_.coverage.data() + to);
+            for (int c = 0; c < piece.channels; ++c)
+                std::copy_n(piece.channel(c).data() + from, length,
+                            block_.values.data() + std::size_t(c) * block_.count() + to);
+        }
+}
+
+bool StoppableSampling::advance(std::chrono::steady_clock::time_point deadline, const Execution& execution) {
+    while (!isDone()) {
+        if (!hasBegun_) begin();
+        cutNext(index_->get(execution));
+        const IndexBox piece = pieces_.back();
+        statistics_ += bound_.resample(
+            lattice_, std::span(&piece, 1), [&](std::size_t, const Block& block) { copy(block); }, execution);
+        pieces_.pop_back();
+        if (pieces_.empty()) {
+            sink_(box_, block_);
+            ++box_;
+            hasBegun_ = false;
+        }
+        if (std::chrono::steady_clock::now() >= deadline) break;
+    }
+    return isDone();
+}
+
+}  // namespace tessera
