@@ -7,6 +7,11 @@ if(TARGET tessera)
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
   endforeach()
+  # An algorithm from outside src/: two files and one registration.
+  tessera_program(tessera_with_oracle SOURCES ${PROJECT_SOURCE_DIR}/apps/tessera/main.cpp register_oracle.cpp oracle_resampler.cpp
+    LINK reference PRIVATE_LINK tessera_app)
+  add_test(NAME own_algorithm_test
+    COMMAND tessera_with_oracle compare ${PROJECT_SOURCE_DIR}/data/ccx-cavity/cavity.vtu --algorithms software,oracle --resolution 16)
   # Short runs; docs/testing.md tells of the long ones.
   add_test(NAME mutated_meshes
     COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera> --count 60 --seed 1

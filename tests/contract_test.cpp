@@ -15,13 +15,11 @@
 namespace tessera::contract {
 namespace {
 
-/// Every registered resampler with every target and format and, to try the suite itself, the oracle.
+/// Every registered resampler with every target and format; among them, to try the suite itself, the oracle.
 const std::vector<Subject>& subjects() {
     static const std::vector<Subject> all = [] {
-        static const OracleResampler oracle;
-        std::vector<Subject> result = subjectsOf(resamplers());
-        result.push_back(subjectsOf(oracle).front());
-        return result;
+        registerResampler(std::make_unique<OracleResampler>());
+        return subjectsOf(resamplers());
     }();
     return all;
 }

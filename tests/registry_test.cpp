@@ -142,5 +142,14 @@ TEST(Registry, ANamedOneMustRunAndHaveTheOptions) {
     EXPECT_EQ(choose({&plain, &quick}, "quick", options).resampler, &quick);
 }
 
+TEST(Registry, TakesAnAlgorithmOfTheCallersOwn) {
+    registerResampler(std::make_unique<FakeResampler>(FakeResampler::Traits{.name = "own", .cost = 1e-6}));
+    EXPECT_EQ(findResampler("own").name(), "own");
+    EXPECT_EQ(chooseResampler("auto").resampler->name(), "own");
+    for (const char* taken : {"own", "software", "auto"})
+        EXPECT_THROW(registerResampler(std::make_unique<FakeResampler>(FakeResampler::Traits{.name = taken})),
+                     InputError);
+}
+
 }  // namespace
 }  // namespace tessera

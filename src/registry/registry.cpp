@@ -1,8 +1,8 @@
 #include "registry/registry.h"
 
 #include <algorithm>
-#include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -62,16 +62,30 @@ std::string whyUnfit(const Resampler& resampler, const BindOptions& options) {
     return whyNot(resampler, options, true);
 }
 
-}  // namespace
-
-std::span<const Resampler* const> resamplers() {
+std::vector<const Resampler*>& registered() {
     static const SoftwareResampler software;
     static const SlicingResampler slicing;
     static const HybridResampler hybrid;
     static const Slicing2001Resampler slicing2001;
     static const Hybrid2001Resampler hybrid2001;
-    static const std::array<const Resampler*, 5> all{&software, &slicing, &hybrid, &slicing2001, &hybrid2001};
+    static std::vector<const Resampler*> all{&software, &slicing, &hybrid, &slicing2001, &hybrid2001};
     return all;
+}
+
+}  // namespace
+
+std::span<const Resampler* const> resamplers() {
+    return registered();
+}
+
+void registerResampler(std::unique_ptr<const Resampler> resampler) {
+    const std::string& name = resampler->name();
+    const auto isNamed = [&](const Resampler* other) { return other->name() == name; };
+    if (name == "auto" || std::any_of(registered().begin(), registered().end(), isNamed))
+        throw InputError("there is an algorithm named " + name + " already");
+    registered().push_back(resampler.get());
+    static std::vector<std::unique_ptr<const Resampler>> kept;
+    kept.push_back(std::move(resampler));
 }
 
 const Resampler& findResampler(std::string_view name) {

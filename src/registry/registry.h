@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,8 +10,13 @@
 namespace tessera {
 
 /// Every resampling algorithm, available on this machine or not, in the order of preference for tests and
-/// listings.
+/// listings: those of the library, then those that were added.
 std::span<const Resampler* const> resamplers();
+
+/// Adds an algorithm of the caller's own to what names, "auto", reports and comparisons find. Not beside
+/// other calls of this header: call it when the program starts. Throws InputError when the name is taken, or
+/// "auto".
+void registerResampler(std::unique_ptr<const Resampler> resampler);
 
 /// Throws InputError, listing the names there are, when there is none of that name, or, with its reason, when
 /// it can't run here.

@@ -1,0 +1,13 @@
+// Adds the oracle to the algorithms of the program that this is linked into.
+
+#include "oracle_resampler.h"
+#include "registry/registry.h"
+
+namespace {
+
+[[maybe_unused]] const bool isRegistered = [] {
+    tessera::registerResampler(std::make_unique<tessera::contract::OracleResampler>());
+    return true;
+}();
+
+}  // namespace
