@@ -16,10 +16,10 @@
 
 #include "bench_statistics.h"
 #include "hybrid/slice_polygon_generator.h"
+#include "index_space/node_frame.h"
 #include "io/read_mesh.h"
 #include "slab/prepared_region.h"
 #include "slicing/silhouette_generator.h"
-#include "software/node_frame.h"
 
 namespace {
 

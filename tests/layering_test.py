@@ -65,7 +65,7 @@ def check_links(rows, problems):
         if not call:
             problems.append(f"{cmake.relative_to(ROOT)} makes no layer {name}")
             continue
-        linked = re.search(r"(?<![A-Z_])LINK\b([a-z\s]*)", call.group(1))
+        linked = re.search(r"(?<![A-Z_])LINK\b([a-z_\s]*)", call.group(1))
         links = set(linked.group(1).split()) if linked else set()
         if closure({**rows, name: links}, name) != closure(rows, name):
             problems.append(f"{cmake.relative_to(ROOT)} links {sorted(links)}, the table says {sorted(rows[name])}")

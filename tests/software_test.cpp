@@ -6,10 +6,10 @@
 #include <random>
 
 #include "base/error.h"
+#include "index_space/element_bins.h"
+#include "index_space/element_depth.h"
+#include "index_space/node_frame.h"
 #include "registry/registry.h"
-#include "software/element_bins.h"
-#include "software/element_depth.h"
-#include "software/node_frame.h"
 #include "software/software_resampler.h"
 
 namespace tessera {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "index_space/exact_scan.h"
 #include "slab/regions.h"
-#include "software/scan.h"
 
 namespace tessera {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "base/vec.h"
+#include "index_space/node_frame.h"
 #include "mesh/tet_mesh.h"
-#include "software/node_frame.h"
 
 namespace tessera {
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "slab/prepared_region.h"
-#include "software/scan.h"
+#include "software/scan_kernel.h"
 
 namespace tessera {
 

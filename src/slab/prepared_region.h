@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "base/execution.h"
+#include "index_space/node_frame.h"
 #include "slab/channel_coding.h"
 #include "slab/element_shape.h"
 #include "slab/slice_batch.h"
-#include "software/node_frame.h"
 
 namespace tessera {
 

@@ -11,12 +11,12 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
+#include "index_space/element_bins.h"
 #include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
 #include "slab/device_samples.h"
 #include "slab/regions.h"
 #include "slab/slab_device.h"
-#include "software/element_bins.h"
 
 namespace tessera {
 

@@ -12,7 +12,7 @@
 #include <limits>
 #include <optional>
 
-#include "software/scan.h"
+#include "software/scan_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "software/scan_kernel.cpp"

@@ -12,10 +12,10 @@
 
 #include "base/error.h"
 #include "base/timer.h"
+#include "index_space/element_bins.h"
 #include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
-#include "software/element_bins.h"
-#include "software/scan.h"
+#include "software/scan_kernel.h"
 
 namespace tessera {
 

@@ -1,4 +1,4 @@
-#include "software/node_frame.h"
+#include "index_space/node_frame.h"
 
 #include <cmath>
 

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
+#include "index_space/node_frame.h"
 #include "mesh/tet_mesh.h"
-#include "software/node_frame.h"
 
 namespace tessera {
 

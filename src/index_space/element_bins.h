@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "base/execution.h"
+#include "index_space/node_frame.h"
 #include "mesh/tet_mesh.h"
-#include "software/node_frame.h"
 
 namespace tessera {
 

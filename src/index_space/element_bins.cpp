@@ -1,4 +1,4 @@
-#include "software/element_bins.h"
+#include "index_space/element_bins.h"
 
 #include <algorithm>
 #include <bit>

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "index_space/exact_scan.h"
 #include "mesh/geometry.h"
-#include "software/scan.h"
 
 namespace tessera {
 
@@ -93,7 +93,7 @@ void setUpBox(ExactElement<Real>& e) {
     }
 }
 
-// False when 113 bits can't promise the limits of scan.h.
+// False when 113 bits can't promise the limits of exact_scan.h.
 bool setUp(const ScanInput& input, std::int32_t element, ExactElement<Quad>& e) {
     const auto& tet = input.mesh.tets[std::size_t(element)];
     double farthest = 1;

@@ -1,4 +1,4 @@
-#include "software/element_depth.h"
+#include "index_space/element_depth.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/vec.h"
+#include "index_space/element_depth.h"
+#include "index_space/node_frame.h"
 #include "mesh/tet_mesh.h"
-#include "software/element_depth.h"
-#include "software/node_frame.h"
 
 namespace tessera {
 
@@ -91,17 +91,6 @@ class ExactScanlines {
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
-
-using ScanFunction = void (*)(const ScanInput&, const ScanOutput&, std::span<const std::int32_t> elements,
-                              ScanCounts&);
-
-/// A compiled version of the scan for one instruction set.
-struct ScanTarget {
-    std::string name;
-    ScanFunction scan;
-};
-/// Those that this processor can run, the fastest first. All give the same bits.
-const std::vector<ScanTarget>& scanTargets();
 
 /// A point is covered when every barycentric coordinate is at least -T, where T bounds all rounding. T below
 /// the first limit keeps a value within 1/16 ulp; T times the element's size below the second keeps a covered
