@@ -10,11 +10,17 @@ namespace tessera {
 
 namespace {
 
+/// Items lie anywhere: they are asked for this many ahead of their use.
+constexpr std::size_t kAhead = 16;
+
 Field extractField(const Field& field, std::span<const std::int32_t> items) {
     Field part{field.name, field.location, field.components, {}};
     part.values.reserve(items.size() * std::size_t(field.components));
-    for (const std::int32_t item : items)
-        for (int c = 0; c < field.components; ++c) part.values.push_back(field.at(item, c));
+    for (std::size_t i = 0; i < items.size(); ++i) {
+        const std::size_t ahead = std::size_t(items[std::min(i + kAhead, items.size() - 1)]);
+        __builtin_prefetch(field.values.data() + ahead * std::size_t(field.components));
+        for (int c = 0; c < field.components; ++c) part.values.push_back(field.at(items[i], c));
+    }
     return part;
 }
 
@@ -43,8 +49,6 @@ class NodeNumbers {
     std::int32_t place(std::size_t i) const { return places_[i]; }
 
   private:
-    static constexpr std::size_t kAhead = 16;
-
     void numberFew() {
         struct Slot {
             std::int32_t node = -1, place = 0;
@@ -112,7 +116,10 @@ TetMesh extractElements(const TetMesh& mesh, std::span<const std::int32_t> eleme
     const std::vector<std::int32_t>& nodes = numbers.nodes();
     TetMesh part;
     part.points.reserve(nodes.size());
-    for (const std::int32_t node : nodes) part.points.push_back(mesh.points[std::size_t(node)]);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        __builtin_prefetch(&mesh.points[std::size_t(nodes[std::min(i + kAhead, nodes.size() - 1)])]);
+        part.points.push_back(mesh.points[std::size_t(nodes[i])]);
+    }
     part.tets.resize(elements.size());
     for (std::size_t i = 0; i < 4 * elements.size(); ++i) part.tets[i / 4][i % 4] = numbers.place(i);
     for (const int f : fields) {
