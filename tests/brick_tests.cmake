@@ -1,4 +1,5 @@
 tessera_test(brick_tree_test LINK brick)
+tessera_test(brick_growing_test LINK brick)
 tessera_test(brick_store_test LINK brick)
 tessera_test(refine_test LINK brick)
 tessera_test(seams_test LINK brick)

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <tuple>
+#include <unordered_map>
 
-#include "base/error.h"
 #include "brick/kept_points.h"
 
 namespace tessera {
@@ -16,10 +15,10 @@ constexpr std::int64_t kElementChunk = 16384;
 constexpr double kDenseLimit = double(1 << 25);  // bricks of a dense grid of marks
 
 // Keeps every brick with points that reading inside the bounds can need.
-bool insideBounds(const BrickKey& key, const PlanFrame& frame) {
+bool insideBounds(const DepthKey& key, const PlanFrame& frame) {
     if (!frame.boundsWorld) return true;
     const IndexBox kept =
-        KeptPoints(frame.boundsWorld, frame.originWorld, frame.spacingWorld(key.level), 2).range(0);
+        KeptPoints(frame.boundsWorld, frame.originWorld, frame.spacingWorld(key.depth), 2).range(0);
     const Vec3i first = key.index * frame.brickCells;
     return !intersect(kept, {first, first + frame.brickCells}).empty();
 }
@@ -39,7 +38,7 @@ BrickRange bricksMeeting(const Box3d& index, int brickCells) {
             {floorToInt(high.x), floorToInt(high.y), floorToInt(high.z)}};
 }
 
-BrickRange clippedRange(const PlanFrame& frame, int depth) {
+BrickRange clippedRange(const PlanFrame& frame, Depth depth) {
     const double inverse = 1.0 / frame.spacingWorld(depth);
     Box3d box{(frame.meshBoundsWorld.min - frame.originWorld) * inverse,
               (frame.meshBoundsWorld.max - frame.originWorld) * inverse};
@@ -59,12 +58,12 @@ double rangeCount(const BrickRange& range) {
 
 }  // namespace
 
-double PlanFrame::spacingWorld(int depth) const {
-    return std::ldexp(rootSpacingWorld, -depth);
+double PlanFrame::spacingWorld(Depth depth) const {
+    return std::ldexp(rootSpacingWorld, -depth.halvings());
 }
 
-Box3d brickTouchBox(const BrickKey& key, int brickCells) {
-    const Vec3d first = Vec3d(key.index) * double(brickCells);
+Box3d brickTouchBox(const Vec3i& index, int brickCells) {
+    const Vec3d first = Vec3d(index) * double(brickCells);
     return {first - kBrickSlackVoxels, first + double(brickCells)};
 }
 
@@ -83,10 +82,10 @@ BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Executio
 }
 
 void BrickPlan::allocateRoots(const Execution& execution) {
-    const double spacing = frame_.spacingWorld(0);
-    const BrickRange all = clippedRange(frame_, 0);
+    const double spacing = frame_.spacingWorld(Depth(0));
+    const BrickRange all = clippedRange(frame_, Depth(0));
     const std::int64_t count = mesh_->elementCount();
-    std::vector<std::vector<std::pair<BrickKey, std::int32_t>>> found(
+    std::vector<std::vector<std::pair<Vec3i, std::int32_t>>> found(
         std::size_t((count + kElementChunk - 1) / kElementChunk));
     parallelForChunks(execution, count, kElementChunk, [&](std::int64_t begin, std::int64_t end) {
         auto& list = found[std::size_t(begin / kElementChunk)];
@@ -99,51 +98,45 @@ void BrickPlan::allocateRoots(const Execution& execution) {
             for (int z = range.min.z; z <= range.max.z; ++z)
                 for (int y = range.min.y; y <= range.max.y; ++y)
                     for (int x = range.min.x; x <= range.max.x; ++x) {
-                        const BrickKey key{0, {x, y, z}};
-                        if (!insideBounds(key, frame_)) continue;
-                        const Box3d box = brickTouchBox(key, frame_.brickCells);
+                        const Vec3i index{x, y, z};
+                        if (!insideBounds({Depth(0), index}, frame_)) continue;
+                        const Box3d box = brickTouchBox(index, frame_.brickCells);
                         if (single ? element.boundsTouch(box) : element.touches(box))
-                            list.emplace_back(key, std::int32_t(e));
+                            list.emplace_back(index, std::int32_t(e));
                     }
         }
     });
+    std::vector<Vec3i> roots;
+    std::unordered_map<Vec3i, std::size_t, IndexHash> positions;
     for (const auto& list : found)
-        for (const auto& [key, element] : list) {
-            const auto [slot, fresh] = at_.try_emplace(key, std::int64_t(bricks_.size()));
-            if (fresh) bricks_.emplace_back().key = key;
-            bricks_[std::size_t(slot->second)].elements.push_back(element);
+        for (const auto& [index, element] : list) {
+            const auto [position, fresh] = positions.try_emplace(index, roots.size());
+            if (fresh) {
+                roots.push_back(index);
+                bricks_.emplace_back().key = {Depth(0), index};
+            }
+            bricks_[position->second].elements.push_back(element);
         }
-    leafCount_ = bricks_.size();
+    tree_ = GrowingTree(roots);
 }
 
 std::vector<PlannedBrick*> BrickPlan::leaves() {
     std::vector<PlannedBrick*> result;
-    result.reserve(leafCount_);
-    for (PlannedBrick& brick : bricks_)
-        if (brick.key.level >= 0) result.push_back(&brick);
-    std::sort(result.begin(), result.end(), [](const PlannedBrick* a, const PlannedBrick* b) {
-        const Vec3i &i = a->key.index, &j = b->key.index;
-        return std::tie(a->key.level, i.z, i.y, i.x) < std::tie(b->key.level, j.z, j.y, j.x);
-    });
+    result.reserve(leafCount());
+    for (const GrowingLeaf& leaf : tree_.leaves()) result.push_back(&bricks_[leaf.slot]);
     return result;
 }
 
-int BrickPlan::deepest() const {
-    int depth = 0;
-    for (const PlannedBrick& brick : bricks_) depth = std::max(depth, brick.key.level);
-    return depth;
-}
-
+// All eight, those without elements too.
 std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
-    const int depth = brick.key.level + 1;
-    const double spacing = frame_.spacingWorld(depth);
+    const double spacing = frame_.spacingWorld(brick.key.depth + 1);
     std::vector<PlannedBrick> made(8);
     std::array<Box3d, 8> boxes;
     std::array<bool, 8> allowed;
-    for (int c = 0; c < 8; ++c) {
-        made[std::size_t(c)].key = {depth, brick.key.index * 2 + Vec3i(c & 1, (c >> 1) & 1, c >> 2)};
-        boxes[std::size_t(c)] = brickTouchBox(made[std::size_t(c)].key, frame_.brickCells);
-        allowed[std::size_t(c)] = insideBounds(made[std::size_t(c)].key, frame_);
+    for (unsigned c = 0; c < 8; ++c) {
+        made[c].key = childKey(brick.key, c);
+        boxes[c] = brickTouchBox(made[c].key.index, frame_.brickCells);
+        allowed[c] = insideBounds(made[c].key, frame_);
     }
     const std::size_t count = brick.elements.size();
     for (std::size_t n = 0; n < count; ++n) {
@@ -167,13 +160,12 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
             if (hitCount == 1 || element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
     }
     splitSamples(brick, made);
-    std::erase_if(made, [](const PlannedBrick& child) { return child.elements.empty(); });
     return made;
 }
 
 void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick>& made) const {
     if (brick.samples.empty()) return;
-    const double inverse = 1.0 / (frame_.spacingWorld(brick.key.level) * frame_.brickCells);
+    const double inverse = 1.0 / (frame_.spacingWorld(brick.key.depth) * frame_.brickCells);
     const Vec3d middle = Vec3d(brick.key.index) + 0.5;
     for (const std::uint32_t sample : brick.samples) {
         const Vec3d place = placeOfSample(sample) * inverse;
@@ -187,97 +179,30 @@ void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick
     }
 }
 
-void BrickPlan::replace(const BrickKey& key, std::vector<PlannedBrick> made) {
-    const auto slot = at_.find(key);
-    TESSERA_CHECK(slot != at_.end() && slot->second >= 0, "only a leaf is split");
-    splitSlots_.push_back(slot->second);
-    // The split brick keeps its contents for undo(); a negative depth marks it as no leaf.
-    bricks_[std::size_t(slot->second)].key.level = -1 - key.level;
-    slot->second = kInner;
-    for (PlannedBrick& child : made) {
-        at_.emplace(child.key, std::int64_t(bricks_.size()));
-        bricks_.push_back(std::move(child));
-    }
-    leafCount_ += made.size();
-    leafCount_ -= 1;
-}
-
-std::vector<BrickKey> BrickPlan::unbalanced(const std::vector<BrickKey>& fresh) const {
-    std::vector<BrickKey> coarse;
-    for (const BrickKey& key : fresh) {
-        if (key.level < 2) continue;
-        // The parents of the 26 neighbours are at most eight bricks: per axis the own parent and the one on
-        // the nearer side.
-        const Vec3i low{(key.index.x - 1) >> 1, (key.index.y - 1) >> 1, (key.index.z - 1) >> 1};
-        for (int c = 0; c < 8; ++c) {
-            BrickKey parent{key.level - 1, low + Vec3i(c & 1, (c >> 1) & 1, c >> 2)};
-            while (parent.level >= 0) {
-                const auto found = at_.find(parent);
-                if (found != at_.end()) {
-                    if (found->second >= 0 && parent.level < key.level - 1) coarse.push_back(parent);
-                    break;
-                }
-                parent = {parent.level - 1, {parent.index.x >> 1, parent.index.y >> 1, parent.index.z >> 1}};
-            }
-        }
-    }
-    std::sort(coarse.begin(), coarse.end(), [](const BrickKey& a, const BrickKey& b) {
-        return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
-               std::tie(b.level, b.index.z, b.index.y, b.index.x);
-    });
-    coarse.erase(std::unique(coarse.begin(), coarse.end()), coarse.end());
-    return coarse;
-}
-
-void BrickPlan::undo() {
-    for (std::size_t i = slotsBefore_; i < bricks_.size(); ++i) {
-        const int level = bricks_[i].key.level;
-        at_.erase(BrickKey{level >= 0 ? level : -1 - level, bricks_[i].key.index});
-    }
-    for (const std::int64_t slot : splitSlots_)
-        if (std::size_t(slot) < slotsBefore_) {
-            BrickKey& key = bricks_[std::size_t(slot)].key;
-            key.level = -1 - key.level;
-            at_[key] = slot;
-        }
-    bricks_.resize(slotsBefore_);
-}
-
-bool BrickPlan::split(const std::vector<BrickKey>& keys, std::size_t maxLeaves, const Execution& execution) {
-    splitSlots_.clear();
-    slotsBefore_ = bricks_.size();
-    const std::size_t leavesBefore = leafCount_;
-    std::vector<BrickKey> pending = keys, fresh;
-    while (!pending.empty()) {
-        std::vector<std::vector<PlannedBrick>> made(pending.size());
-        parallelFor(execution, std::int64_t(pending.size()), [&](std::int64_t i) {
-            made[std::size_t(i)] = children(bricks_[std::size_t(at_.at(pending[std::size_t(i)]))]);
+bool BrickPlan::split(std::span<const DepthKey> keys, std::size_t maxLeaves, const Execution& execution) {
+    const TreeChange& change = tree_.change();
+    std::vector<PlannedBrick> made;  // in the order of change.added
+    const auto choose = [&](std::span<const GrowingLeaf> wave, std::span<ChildBits> bits) {
+        std::vector<std::vector<PlannedBrick>> all(wave.size());
+        parallelFor(execution, std::int64_t(wave.size()), [&](std::int64_t i) {
+            all[std::size_t(i)] = children(bricks_[wave[std::size_t(i)].slot]);
         });
-        for (std::size_t i = 0; i < pending.size(); ++i) {
-            for (const PlannedBrick& child : made[i]) fresh.push_back(child.key);
-            replace(pending[i], std::move(made[i]));
-        }
-        if (leafCount_ > maxLeaves) {
-            undo();
-            leafCount_ = leavesBefore;
-            return false;
-        }
-        // A split can unbalance others, and a brick stays a cause until its neighbours are fine enough.
-        pending = unbalanced(fresh);
-    }
-    for (const std::int64_t slot : splitSlots_)
-        bricks_[std::size_t(slot)] = PlannedBrick{{-1, {}}, {}, {}, false, -1, 0};
-    std::erase_if(bricks_, [](const PlannedBrick& brick) { return brick.key.level < 0; });
-    for (std::size_t i = 0; i < bricks_.size(); ++i) at_[bricks_[i].key] = std::int64_t(i);
+        for (std::size_t i = 0; i < wave.size(); ++i)
+            for (unsigned c = 0; c < 8; ++c) {
+                if (all[i][c].elements.empty()) continue;
+                bits[i] = ChildBits(bits[i] | 1u << c);
+                made.push_back(std::move(all[i][c]));
+            }
+    };
+    if (!tree_.split(keys, maxLeaves, choose)) return false;
+    for (const GrowingLeaf& leaf : change.removed) bricks_[leaf.slot] = {};
+    bricks_.resize(tree_.slotCount());
+    for (std::size_t i = 0; i < made.size(); ++i) bricks_[change.added[i].slot] = std::move(made[i]);
     return true;
 }
 
-BrickTree BrickPlan::tree(int finestDepth) const {
-    const int finest = finestDepth >= 0 ? finestDepth : deepest();
-    std::vector<BrickKey> keys;
-    keys.reserve(bricks_.size());
-    for (const PlannedBrick& brick : bricks_) keys.push_back({finest - brick.key.level, brick.key.index});
-    return BrickTree(frame_.originWorld, frame_.spacingWorld(finest), frame_.brickCells, std::move(keys));
+BrickTree BrickPlan::tree(Depth finest) const {
+    return tree_.brickTree(frame_.originWorld, frame_.rootSpacingWorld, frame_.brickCells, finest);
 }
 
 namespace {
@@ -368,7 +293,7 @@ BrickRange elementRange(const TetMesh& mesh, const std::vector<NodeBrick>& nodes
 
 std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int64_t limit,
                            std::vector<BrickKey>* keys, const Execution& execution) {
-    const int depth = frame.maxDepth;
+    const Depth depth = frame.maxDepth;
     const BrickRange range = clippedRange(frame, depth);
     if (rangeCount(range) > kDenseLimit) return -1;
     BrickMarks marks(range);
@@ -396,8 +321,8 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
                             if (mark.load(std::memory_order_relaxed)) continue;
                             if (!element)
                                 element.emplace(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
-                            const BrickKey key{depth, {x, y, z}};
-                            if (element->touches(brickTouchBox(key, frame.brickCells)) &&
+                            const DepthKey key{depth, {x, y, z}};
+                            if (element->touches(brickTouchBox(key.index, frame.brickCells)) &&
                                 insideBounds(key, frame))
                                 mark.store(1, std::memory_order_relaxed);
                         }

@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <unordered_map>
+#include <span>
 #include <vector>
 
 #include "base/execution.h"
 #include "brick/brick_tree.h"
+#include "brick/depth.h"
+#include "brick/growing_tree.h"
 #include "brick/overlap.h"
 #include "mesh/tet_mesh.h"
 
@@ -19,16 +21,16 @@ namespace tessera {
 struct PlanFrame {
     Vec3d originWorld{0};
     double rootSpacingWorld = 1;
-    int maxDepth = 0;  ///< the finest spacing allowed is that of this depth
+    Depth maxDepth;  ///< the finest spacing allowed is that of this depth
     int brickCells = 16;
     std::optional<Box3d> boundsWorld;
     Box3d meshBoundsWorld;
-    double spacingWorld(int depth) const;
+    double spacingWorld(Depth depth) const;
 };
 
-/// One leaf of a growing tree. In `key` the level is the depth (0: coarsest).
+/// One leaf of a plan.
 struct PlannedBrick {
-    BrickKey key;
+    DepthKey key;
     std::vector<std::int32_t> elements;  ///< that touch the brick, ascending
     std::vector<std::uint32_t> samples;  ///< error-driven: samples inside the brick, ascending
     bool sampled = false;                ///< error-driven: its values are in the store
@@ -36,52 +38,42 @@ struct PlannedBrick {
     double ratio = 0;                    ///< error-driven: what refinement goes by
 };
 
-/// The growing tree: leaves over the elements, split on demand, kept 2:1 balanced.
+/// A growing tree over the elements of a mesh: leaves are split on demand, and children that no element
+/// touches are dropped.
 class BrickPlan {
   public:
     /// Allocates the bricks of depth 0.
     BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution);
 
     const PlanFrame& frame() const { return frame_; }
-    std::size_t leafCount() const { return leafCount_; }
+    std::size_t leafCount() const { return tree_.leafCount(); }
     /// Ascending by depth, z, y, x; valid until the next split().
     std::vector<PlannedBrick*> leaves();
-    int deepest() const;
+    Depth deepest() const { return tree_.deepest(); }
 
-    /// Splits these leaves, and coarser neighbours until the tree is balanced again; children without
-    /// elements are dropped. When more than maxLeaves would stand, leaves everything as it was and returns
-    /// false.
-    bool split(const std::vector<BrickKey>& keys, std::size_t maxLeaves, const Execution& execution);
+    /// Splits these leaves, and coarser neighbours until the tree is balanced again. When more than maxLeaves
+    /// would stand, leaves everything as it was and returns false.
+    bool split(std::span<const DepthKey> keys, std::size_t maxLeaves, const Execution& execution);
 
-    /// Level 0 is the deepest depth present, or `finestDepth` when given (>= 0).
-    BrickTree tree(int finestDepth = -1) const;
+    /// Depth `finest`, the deepest or below, becomes level 0.
+    BrickTree tree(Depth finest) const;
 
     /// Set by who uses samples: a sample's place relative to the origin, world units.
     std::function<Vec3d(std::uint32_t)> placeOfSample;
 
   private:
-    static constexpr std::int64_t kInner = -1;
-    static constexpr std::int64_t kGone = -2;
-
     void allocateRoots(const Execution& execution);
     std::vector<PlannedBrick> children(const PlannedBrick& brick) const;
     void splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick>& made) const;
-    void replace(const BrickKey& key, std::vector<PlannedBrick> made);
-    std::vector<BrickKey> unbalanced(const std::vector<BrickKey>& fresh) const;
-    void undo();
 
     const TetMesh* mesh_;
     PlanFrame frame_;
-    std::vector<PlannedBrick> bricks_;  // leaves, and slots of bricks that were split
-    std::unordered_map<BrickKey, std::int64_t, BrickKeyHash> at_;  // position in bricks_, or kInner
-    std::size_t leafCount_ = 0;
-    // What the running split() did, for undo(): slots split, keys made.
-    std::vector<std::int64_t> splitSlots_;
-    std::size_t slotsBefore_ = 0;
+    GrowingTree tree_;
+    std::vector<PlannedBrick> bricks_;  // by the slots of tree_; empty ones at free slots
 };
 
-/// Box of the half-open brick of `depth`, in index space of that depth, with the slack below.
-Box3d brickTouchBox(const BrickKey& key, int brickCells);
+/// Box of a half-open brick in index space of its depth, with the slack below.
+Box3d brickTouchBox(const Vec3i& index, int brickCells);
 
 /// Nodes of an element in index space of a spacing.
 std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,

@@ -56,7 +56,7 @@ void coarsenRoot(PlanFrame& frame, std::vector<float>& sizes, double samplesPerE
     int up = 0;
     while (std::ldexp(1.0, up + 1) <= std::min(wanted, most)) ++up;
     frame.rootSpacingWorld = std::ldexp(frame.rootSpacingWorld, up);
-    frame.maxDepth += up;
+    frame.maxDepth = frame.maxDepth + up;
     for (float& size : sizes) size = std::ldexp(size, -up);
 }
 
@@ -82,10 +82,10 @@ std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxL
     // the way.
     const int down = 8;
     frame.rootSpacingWorld = std::ldexp(frame.rootSpacingWorld, down);
-    frame.maxDepth = down;
+    frame.maxDepth = Depth(down);
     BrickPlan plan(mesh, frame, execution);
     for (int depth = 0; depth < down; ++depth) {
-        std::vector<BrickKey> all;
+        std::vector<DepthKey> all;
         for (const PlannedBrick* brick : plan.leaves()) all.push_back(brick->key);
         if (!plan.split(all, maxLeaves, execution)) return std::int64_t(maxLeaves) + 1;
     }
@@ -135,7 +135,7 @@ BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOpt
     if (count > std::int64_t(maxLeaves)) {
         const Vec3d size = (options.boundsWorld ? *options.boundsWorld : meshBox).size();
         const double longest = std::max({size.x, size.y, size.z});
-        const int points = int(std::min(5e8, std::ceil(longest / frame.spacingWorld(0)) + 1));
+        const int points = int(std::min(5e8, std::ceil(longest / frame.spacingWorld(Depth(0))) + 1));
         const int fits = largestResolution(mesh, meshBox, options, maxLeaves, points, execution);
         throw InputError("the uniform lattice of " + std::to_string(points) +
                          " points along the longest axis needs more than " + budgetText(options, maxLeaves) +
@@ -163,17 +163,19 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
         throw InputError("the coarsest plan has " + std::to_string(plan.leafCount() * brickPoints) +
                          " voxels, more than " + budgetText(options, maxLeaves) +
                          "; smaller bricks, a larger spacing or smaller bounds need fewer");
-    for (int depth = 0; depth < frame.maxDepth; ++depth) {
-        execution.report(Stage::planning, depth, frame.maxDepth);
+    const int depths = frame.maxDepth.halvings();
+    for (int d = 0; d < depths; ++d) {
+        const Depth depth(d);
+        execution.report(Stage::planning, d, depths);
         const auto leaves = plan.leaves();
         std::vector<std::uint8_t> wanted(leaves.size(), 0);
         parallelFor(execution, std::int64_t(leaves.size()), [&](std::int64_t i) {
             const PlannedBrick& brick = *leaves[std::size_t(i)];
-            if (brick.key.level != depth) return;
-            const double spacing = std::ldexp(1.0, -depth);  // in units of the root spacing, as the sizes are
+            if (brick.key.depth != depth) return;
+            const double spacing = std::ldexp(1.0, -d);  // in units of the root spacing, as the sizes are
             wanted[std::size_t(i)] = isTooCoarse(brick, sizes, spacing, options.samplesPerElement) ? 1 : 0;
         });
-        std::vector<BrickKey> splits;
+        std::vector<DepthKey> splits;
         for (std::size_t i = 0; i < leaves.size(); ++i)
             if (wanted[i]) splits.push_back(leaves[i]->key);
         if (splits.empty()) break;
@@ -189,7 +191,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
                              " voxels: the finest spacing is " + fits);
         break;
     }
-    return plan.tree(options.frame ? frame.maxDepth : -1);
+    return plan.tree(options.frame ? frame.maxDepth : plan.deepest());
 }
 
 }  // namespace

@@ -128,7 +128,7 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
         if (options.criterion != Criterion::uniform)
             while (depth + 1 < levels && longest / std::ldexp(finest, depth + 1) >= rootCells) ++depth;
         frame.rootSpacingWorld = std::ldexp(finest, depth);
-        frame.maxDepth = depth;
+        frame.maxDepth = Depth(depth);
         return frame;
     }
     frame.rootSpacingWorld = longest / rootCells;
@@ -136,7 +136,9 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     if (options.boundsWorld && options.criterion == Criterion::error && options.maxLevels == 0)
         while (frame.rootSpacingWorld * options.brickCells < longest) frame.rootSpacingWorld *= 2;
     const double far = std::max(1.0, farthestIndex(sampled, frame.originWorld, frame.rootSpacingWorld));
-    while (frame.maxDepth + 1 < levels && std::ldexp(far, frame.maxDepth + 1) < kMaxIndex) ++frame.maxDepth;
+    int depth = 0;
+    while (depth + 1 < levels && std::ldexp(far, depth + 1) < kMaxIndex) ++depth;
+    frame.maxDepth = Depth(depth);
     return frame;
 }
 

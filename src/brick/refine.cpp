@@ -142,7 +142,7 @@ class ErrorRefinement {
     void sampleNewLeaves();
     void measureChanged();
     double expectedLater(double now) const;
-    std::vector<BrickKey> wanted(std::size_t limit) const;
+    std::vector<DepthKey> wanted(std::size_t limit) const;
     bool refine();
     double totalMeanSquare() const;
     void addNodeWeights();
@@ -177,7 +177,7 @@ class ErrorRefinement {
 
 // Gives every sample to the root brick that it lies in.
 void ErrorRefinement::takeSamples() {
-    const BrickTree roots = plan_.tree();
+    const BrickTree roots = plan_.tree(Depth(0));
     const SamplesByLeaf sorted = sortSamples(samples_, roots, options_.boundsWorld, execution_);
     for (PlannedBrick* brick : plan_.leaves()) {
         const std::int64_t leaf = roots.findLeaf({0, brick->key.index});
@@ -189,11 +189,11 @@ void ErrorRefinement::takeSamples() {
 // Builds the tree of the leaves that stand now, keeps the samples there are and takes the missing ones.
 void ErrorRefinement::sampleNewLeaves() {
     Timer timer;
-    tree_ = plan_.tree(options_.frame ? plan_.frame().maxDepth : -1);
-    const int finest = options_.frame ? plan_.frame().maxDepth : plan_.deepest();
+    const Depth finest = options_.frame ? plan_.frame().maxDepth : plan_.deepest();
+    tree_ = plan_.tree(finest);
     leaves_.assign(tree_.leafCount(), nullptr);
     for (PlannedBrick* brick : plan_.leaves())
-        leaves_[std::size_t(tree_.findLeaf({finest - brick->key.level, brick->key.index}))] = brick;
+        leaves_[std::size_t(tree_.findLeaf({levelOf(brick->key.depth, finest), brick->key.index}))] = brick;
     BrickStore next(tree_.brickCells(), tree_.leafCount(), samples_.channels());
     std::vector<std::size_t> missing;
     fresh_.assign(leaves_.size(), 0);
@@ -305,12 +305,12 @@ double ErrorRefinement::totalMeanSquare() const {
 }
 
 // Leaves to split, the worst first, at most `limit`.
-std::vector<BrickKey> ErrorRefinement::wanted(std::size_t limit) const {
+std::vector<DepthKey> ErrorRefinement::wanted(std::size_t limit) const {
     std::vector<const PlannedBrick*> worst;
     const bool rms = options_.measure == ErrorMeasure::rms;
-    const int maxDepth = plan_.frame().maxDepth;
+    const Depth maxDepth = plan_.frame().maxDepth;
     for (const PlannedBrick* leaf : leaves_)
-        if (leaf->key.level < maxDepth && leaf->ratio > (rms ? 0.0 : 1.0)) worst.push_back(leaf);
+        if (leaf->key.depth < maxDepth && leaf->ratio > (rms ? 0.0 : 1.0)) worst.push_back(leaf);
     std::stable_sort(worst.begin(), worst.end(),
                      [](const PlannedBrick* a, const PlannedBrick* b) { return a->ratio > b->ratio; });
     if (rms) {
@@ -323,7 +323,7 @@ std::vector<BrickKey> ErrorRefinement::wanted(std::size_t limit) const {
         worst.resize(total > 1 ? count : 0);
     }
     if (worst.size() > limit) worst.resize(limit);
-    std::vector<BrickKey> keys;
+    std::vector<DepthKey> keys;
     for (const PlannedBrick* leaf : worst) keys.push_back(leaf->key);
     return keys;
 }
@@ -331,7 +331,7 @@ std::vector<BrickKey> ErrorRefinement::wanted(std::size_t limit) const {
 // One round. False when nothing is left to split, or no split fits the budget.
 bool ErrorRefinement::refine() {
     Timer timer;
-    std::vector<BrickKey> keys = wanted(std::numeric_limits<std::size_t>::max());
+    std::vector<DepthKey> keys = wanted(std::numeric_limits<std::size_t>::max());
     const bool any = !keys.empty();
     worstRatio_ = 0;
     for (const PlannedBrick* leaf : leaves_) worstRatio_ = std::max(worstRatio_, leaf->ratio);
