@@ -14,8 +14,8 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "brick/refine.h"
 #include "io/read_mesh.h"
+#include "refine/refine.h"
 #include "registry/registry.h"
 #include "vtk_resample.h"
 

@@ -16,10 +16,10 @@
 
 #include "base/error.h"
 #include "base/execution.h"
-#include "brick/error_samples.h"
 #include "io/read_mesh.h"
 #include "mesh/element_index.h"
 #include "mesh/nearest_point.h"
+#include "refine/error_samples.h"
 
 namespace tessera {
 namespace {

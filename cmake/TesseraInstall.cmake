@@ -1,5 +1,5 @@
 # `cmake --install`: headers under include/tessera/<layer>/, static libraries, the command line and package files, so that another project can say
-# find_package(Tessera) and link Tessera::brick, Tessera::io, ...
+# find_package(Tessera) and link Tessera::refine, Tessera::io, ...
 include(CMakePackageConfigHelpers)
 
 set(TESSERA_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Tessera)

@@ -1,10 +1,10 @@
-#include "brick/measure_error.h"
+#include "refine/measure_error.h"
 
 #include <gtest/gtest.h>
 
-#include "brick/refine.h"
 #include "brick_test_meshes.h"
 #include "brute_force_resampler.h"
+#include "refine/refine.h"
 
 namespace tessera {
 namespace {

@@ -1,4 +1,4 @@
-#include "brick/refine.h"
+#include "refine/refine.h"
 
 #include <gtest/gtest.h>
 

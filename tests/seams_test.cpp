@@ -8,10 +8,10 @@
 #include <set>
 
 #include "brick/extend.h"
-#include "brick/measure_error.h"
-#include "brick/refine.h"
 #include "brick_test_meshes.h"
 #include "brute_force_resampler.h"
+#include "refine/measure_error.h"
+#include "refine/refine.h"
 
 namespace tessera {
 namespace {

@@ -5,7 +5,6 @@
 
 #include "base/error.h"
 #include "base/timer.h"
-#include "brick/measure_error.h"
 #include "commands.h"
 #include "field_selection.h"
 #include "import_mesh.h"
@@ -15,6 +14,7 @@
 #include "output_paths.h"
 #include "predict_cost.h"
 #include "program_presets.h"
+#include "refine/measure_error.h"
 #include "registry/registry.h"
 #include "report_text.h"
 #include "series_steps.h"

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "base/vec.h"
-#include "brick/refine.h"
 #include "io/output_formats.h"
 #include "io/shape_output.h"
 #include "io/vdb_file.h"
+#include "refine/refine.h"
 
 namespace tessera {
 

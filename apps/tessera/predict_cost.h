@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "brick/refine.h"
+#include "refine/refine.h"
 #include "resample/resampler.h"
 
 namespace tessera {

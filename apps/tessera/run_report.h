@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "brick/refine.h"
 #include "io/read_mesh.h"
 #include "io/vdb_file.h"
+#include "refine/refine.h"
 
 namespace tessera {
 

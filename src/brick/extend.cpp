@@ -12,7 +12,6 @@
 #include <unordered_set>
 
 #include "base/error.h"
-#include "brick/brick_plan.h"
 #include "brick/leaf_tiles.h"
 #include "brick/overlap.h"
 

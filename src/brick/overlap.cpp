@@ -58,4 +58,13 @@ bool ElementOverlap::touches(const Box3d& box) const {
     return true;
 }
 
+std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
+                                         double spacingWorld) {
+    const double inverse = 1.0 / spacingWorld;
+    std::array<Vec3d, 4> nodes;
+    const auto& tet = mesh.tets[std::size_t(element)];
+    for (std::size_t i = 0; i < 4; ++i) nodes[i] = (mesh.points[std::size_t(tet[i])] - originWorld) * inverse;
+    return nodes;
+}
+
 }  // namespace tessera

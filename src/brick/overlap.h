@@ -29,4 +29,16 @@ class ElementOverlap {
     Box3d bounds_;
 };
 
+/// Nodes of an element in index space of a spacing.
+std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
+                                         double spacingWorld);
+
+/// Asks for an element's nodes ahead of their use: elements reach nodes in no order, and waiting for them is
+/// most of what a pass over elements costs.
+inline void prefetchNodes(const TetMesh& mesh, std::int64_t element) {
+    for (const std::int32_t node : mesh.tets[std::size_t(element)])
+        __builtin_prefetch(&mesh.points[std::size_t(node)]);
+}
+inline constexpr std::int64_t kPrefetchElements = 16;  ///< how far ahead
+
 }  // namespace tessera

@@ -8,10 +8,10 @@
 #include <mutex>
 
 #include "base/error.h"
-#include "brick/error_samples.h"
 #include "brick/leaf_tiles.h"
 #include "io/openvdb_grids.h"
 #include "io/vdb_metadata.h"
+#include "refine/error_samples.h"
 
 namespace tessera {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "brick/error_report.h"
+#include "refine/error_report.h"
 
 namespace tessera {
 

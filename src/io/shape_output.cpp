@@ -9,8 +9,8 @@
 #include "base/error.h"
 #include "brick/extend.h"
 #include "brick/flatten.h"
-#include "brick/measure_error.h"
 #include "io/vdb_metadata.h"
+#include "refine/measure_error.h"
 
 namespace tessera {
 

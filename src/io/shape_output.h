@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/execution.h"
-#include "brick/refine.h"
 #include "io/vdb_file.h"
 #include "mesh/tet_mesh.h"
+#include "refine/refine.h"
 #include "resample/resampler.h"
 
 namespace tessera {

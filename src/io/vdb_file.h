@@ -9,8 +9,8 @@
 #include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
-#include "brick/refine.h"
 #include "brick/seams.h"
+#include "refine/refine.h"
 
 namespace tessera {
 

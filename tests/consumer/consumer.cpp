@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "brick/refine.h"
+#include "refine/refine.h"
 #include "registry/registry.h"
 
 int main() {

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "brick/refine.h"
+#include "refine/refine.h"
 
 namespace tessera {
 

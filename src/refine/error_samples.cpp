@@ -1,4 +1,4 @@
-#include "brick/error_samples.h"
+#include "refine/error_samples.h"
 
 #include <algorithm>
 #include <atomic>

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "brick/brick_plan.h"
-#include "brick/refine.h"
+#include "refine/brick_plan.h"
+#include "refine/refine.h"
 
 namespace tessera {
 

@@ -9,9 +9,9 @@
 #include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
-#include "brick/error_report.h"
 #include "mesh/nearest_point.h"
 #include "mesh/tet_mesh.h"
+#include "refine/error_report.h"
 #include "resample/resampler.h"
 
 namespace tessera {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "brick/plan_frame.h"
+#include "refine/plan_frame.h"
 
 namespace tessera {
 

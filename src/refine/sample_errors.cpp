@@ -1,12 +1,12 @@
-#include "brick/sample_errors.h"
+#include "refine/sample_errors.h"
 
 #include <array>
 #include <atomic>
 #include <cmath>
 
 #include "brick/leaf_tiles.h"
-#include "brick/used_nodes.h"
 #include "mesh/geometry.h"
+#include "refine/used_nodes.h"
 
 namespace tessera {
 

@@ -1,4 +1,4 @@
-#include "brick/used_nodes.h"
+#include "refine/used_nodes.h"
 
 #include <atomic>
 

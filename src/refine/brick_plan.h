@@ -75,18 +75,6 @@ class BrickPlan {
 /// Box of a half-open brick in index space of its depth, with the slack below.
 Box3d brickTouchBox(const Vec3i& index, int brickCells);
 
-/// Nodes of an element in index space of a spacing.
-std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
-                                         double spacingWorld);
-
-/// Asks for an element's nodes ahead of their use: elements reach nodes in no order, and waiting for them is
-/// most of what a pass over elements costs.
-inline void prefetchNodes(const TetMesh& mesh, std::int64_t element) {
-    for (const std::int32_t node : mesh.tets[std::size_t(element)])
-        __builtin_prefetch(&mesh.points[std::size_t(node)]);
-}
-inline constexpr std::int64_t kPrefetchElements = 16;  ///< how far ahead
-
 /// Number of bricks of depth frame.maxDepth that elements touch (and their keys, level 0, when `keys` isn't
 /// null and there are at most `limit`); -1 when the box of bricks is too large for a dense grid of marks. For
 /// single-level trees: no element lists.

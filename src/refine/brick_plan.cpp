@@ -1,4 +1,4 @@
-#include "brick/brick_plan.h"
+#include "refine/brick_plan.h"
 
 #include <algorithm>
 #include <atomic>
@@ -65,15 +65,6 @@ double PlanFrame::spacingWorld(Depth depth) const {
 Box3d brickTouchBox(const Vec3i& index, int brickCells) {
     const Vec3d first = Vec3d(index) * double(brickCells);
     return {first - kBrickSlackVoxels, first + double(brickCells)};
-}
-
-std::array<Vec3d, 4> elementInIndexSpace(const TetMesh& mesh, std::int64_t element, const Vec3d& originWorld,
-                                         double spacingWorld) {
-    const double inverse = 1.0 / spacingWorld;
-    std::array<Vec3d, 4> nodes;
-    const auto& tet = mesh.tets[std::size_t(element)];
-    for (std::size_t i = 0; i < 4; ++i) nodes[i] = (mesh.points[std::size_t(tet[i])] - originWorld) * inverse;
-    return nodes;
 }
 
 BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution)

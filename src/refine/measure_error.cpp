@@ -1,4 +1,4 @@
-#include "brick/measure_error.h"
+#include "refine/measure_error.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
-#include "brick/sample_errors.h"
+#include "refine/sample_errors.h"
 
 namespace tessera {
 

@@ -1,4 +1,4 @@
-#include "brick/plan_frame.h"
+#include "refine/plan_frame.h"
 
 #include <unistd.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "brick/used_nodes.h"
+#include "refine/used_nodes.h"
 
 namespace tessera {
 

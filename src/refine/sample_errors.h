@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/execution.h"
-#include "brick/error_samples.h"
+#include "refine/error_samples.h"
 
 namespace tessera {
 

@@ -1,4 +1,4 @@
-#include "brick/refine.h"
+#include "refine/refine.h"
 
 #include <algorithm>
 #include <atomic>
@@ -9,11 +9,11 @@
 
 #include "base/error.h"
 #include "base/timer.h"
-#include "brick/error_samples.h"
 #include "brick/kept_points.h"
-#include "brick/measure_error.h"
-#include "brick/plan_frame.h"
-#include "brick/resample_tree.h"
+#include "refine/error_samples.h"
+#include "refine/measure_error.h"
+#include "refine/plan_frame.h"
+#include "refine/resample_tree.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 #include <unordered_map>
 
 #include "base/error.h"
-#include "brick/resample_tree.h"
+#include "refine/resample_tree.h"
 
 namespace tessera {
 
