@@ -19,17 +19,27 @@ mkdir -p "$findings" build/fuzz/logs
 export ASAN_OPTIONS=quarantine_size_mb=16:detect_leaks=1:allocator_may_return_null=0
 export UBSAN_OPTIONS=print_stacktrace=1
 
-failed=()
-printf '%-22s %12s %10s %10s %9s %10s\n' target executions coverage features corpus "peak MiB"
+# Every processor has one to run.
 for target in "${targets[@]}"; do
   corpus=build/fuzz/corpus/$target
-  log=build/fuzz/logs/$target.log
   mkdir -p "$corpus"
   options=(-max_total_time="$seconds" -max_len=16384 -timeout=10 -rss_limit_mb=1024 -malloc_limit_mb=64 -print_final_stats=1
     -artifact_prefix="$findings/$target-")
   [[ -f tests/fuzz/$target.dict ]] && options+=(-dict="tests/fuzz/$target.dict")
-  status=0
-  "build/fuzz/tests/fuzz/$target" "${options[@]}" "$corpus" "tests/fuzz/corpus/$target" >"$log" 2>&1 || status=$?
+  while (($(jobs -rp | wc -l) >= $(nproc))); do wait -n || true; done
+  {
+    status=0
+    "build/fuzz/tests/fuzz/$target" "${options[@]}" "$corpus" "tests/fuzz/corpus/$target" >"build/fuzz/logs/$target.log" 2>&1 || status=$?
+    echo "$status" >"build/fuzz/logs/$target.status"
+  } &
+done
+wait
+
+failed=()
+printf '%-22s %12s %10s %10s %9s %10s\n' target executions coverage features corpus "peak MiB"
+for target in "${targets[@]}"; do
+  log=build/fuzz/logs/$target.log
+  status=$(<"build/fuzz/logs/$target.status")
   # The last line of progress: "#4242 DONE cov: 123 ft: 456 corp: 78/9Kb ..."
   progress=$(grep -E '^#[0-9]+.* cov: ' "$log" | tail -n 1 || true)
   word() { sed -nE "s/.*$1 ([^ ]+).*/\1/p" <<<"$2"; }

@@ -2,7 +2,7 @@ add_library(contract_suite STATIC contract_suite.cpp contract_cases.cpp oracle_r
 target_link_libraries(contract_suite PUBLIC tessera_reference GTest::gtest PRIVATE tessera_flags)
 tessera_precompile(contract_suite)
 
-tessera_test(oracle_test LINK reference)
+tessera_test(oracle_test OPTIMISED LINK reference)
 tessera_test(contract_checker_test LINK reference PRIVATE_LINK contract_suite)
 tessera_test(contract_format_test LINK reference software PRIVATE_LINK contract_suite)
 tessera_test(contract_test LINK reference registry PRIVATE_LINK contract_suite)
