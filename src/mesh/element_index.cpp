@@ -1,6 +1,7 @@
 #include "mesh/element_index.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -49,6 +50,31 @@ float roundedUp(double x) {
 float stepsPer(float size) {
     const float scale = 256 / size;
     return std::isfinite(scale) ? scale : 0;
+}
+
+/// How a child's box and the one asked for lie.
+enum class Meeting { apart, across, inside };
+template <class Node, class Box>
+Meeting meetingOf(const Node& node, std::size_t c, const Box& box) {
+    bool meets = true, isInside = true;
+    for (std::size_t a = 0; a < 3; ++a) {
+        meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
+        isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
+    }
+    return !meets ? Meeting::apart : isInside ? Meeting::inside : Meeting::across;
+}
+
+/// One bit for each of the group's elements whose box meets the one asked for, that in the group's steps.
+template <class Group>
+unsigned metInGroup(const Group& group, const std::array<std::uint8_t, 6>& steps, std::size_t elements) {
+    unsigned met = 0;
+    for (std::size_t i = 0; i < elements; ++i) {
+        bool each = true;
+        for (std::size_t a = 0; a < 3; ++a)
+            each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
+        met |= unsigned(each) << i;
+    }
+    return met;
 }
 
 Box3d boxOf(const TetMesh& mesh, std::int64_t element) {
@@ -309,34 +335,20 @@ void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box
                          std::vector<std::int32_t>& elements) const {
     const Node& node = levels_[level][std::size_t(n)];
     for (std::size_t c = 0; c < kWidth; ++c) {
-        bool meets = true, isInside = true;
-        for (std::size_t a = 0; a < 3; ++a) {
-            meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
-            isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
-        }
-        if (!meets) continue;
+        const Meeting meeting = meetingOf(node, c, box);
+        if (meeting == Meeting::apart) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
-        if (isInside) {
+        if (meeting == Meeting::inside) {
             const std::span<const std::int32_t> all = elementsBelow(level, below);
             elements.insert(elements.end(), all.begin(), all.end());
-            continue;
-        }
-        if (level > 0) {
+        } else if (level > 0) {
             query(level - 1, below, box, elements);
-            continue;
+        } else {
+            const std::span<const std::int32_t> group = elementsBelow(level, below);
+            unsigned met =
+                metInGroup(groups_[std::size_t(below)], stepsWithin(box, child(node, c)), group.size());
+            for (; met != 0; met &= met - 1) elements.push_back(group[std::size_t(std::countr_zero(met))]);
         }
-        const Group& group = groups_[std::size_t(below)];
-        const std::array<std::uint8_t, 6> steps = stepsWithin(box, child(node, c));
-        std::array<bool, kWidth> found;
-        for (std::size_t i = 0; i < kWidth; ++i) {
-            bool each = true;
-            for (std::size_t a = 0; a < 3; ++a)
-                each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
-            found[i] = each;
-        }
-        const std::size_t place = std::size_t(below) * kWidth;
-        for (std::size_t i = 0; i < std::min<std::size_t>(kWidth, order_.size() - place); ++i)
-            if (found[i]) elements.push_back(order_[place + i]);
     }
 }
 
@@ -344,29 +356,16 @@ std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const Mapped
     const Node& node = levels_[level][std::size_t(n)];
     std::int64_t sum = 0;
     for (std::size_t c = 0; c < kWidth; ++c) {
-        bool meets = true, isInside = true;
-        for (std::size_t a = 0; a < 3; ++a) {
-            meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
-            isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
-        }
-        if (!meets) continue;
+        const Meeting meeting = meetingOf(node, c, box);
+        if (meeting == Meeting::apart) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
-        if (isInside) {
+        if (meeting == Meeting::inside)
             sum += std::int64_t(elementsBelow(level, below).size());
-            continue;
-        }
-        if (level > 0) {
+        else if (level > 0)
             sum += count(level - 1, below, box);
-            continue;
-        }
-        const Group& group = groups_[std::size_t(below)];
-        const std::array<std::uint8_t, 6> steps = stepsWithin(box, child(node, c));
-        for (std::size_t i = 0; i < kWidth; ++i) {
-            bool each = true;
-            for (std::size_t a = 0; a < 3; ++a)
-                each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
-            sum += each && std::size_t(below) * kWidth + i < order_.size();
-        }
+        else
+            sum += std::popcount(metInGroup(groups_[std::size_t(below)], stepsWithin(box, child(node, c)),
+                                            elementsBelow(level, below).size()));
     }
     return sum;
 }
