@@ -20,7 +20,7 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 #include "reference/random.h"

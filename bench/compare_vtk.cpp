@@ -14,8 +14,10 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
+#include "refine/brick_result.h"
 #include "refine/refine.h"
+#include "refine/refine_options.h"
 #include "registry/registry.h"
 #include "vtk_resample.h"
 

@@ -17,8 +17,8 @@
 #include "bench_statistics.h"
 #include "hybrid/slice_polygon_generator.h"
 #include "index_space/node_frame.h"
-#include "io/read_mesh.h"
-#include "slab/prepared_region.h"
+#include "mesh_files/read_mesh.h"
+#include "raster/prepared_region.h"
 #include "slicing/silhouette_generator.h"
 
 namespace {
@@ -74,7 +74,7 @@ Counts countList(const PrimitiveList& list) {
 }
 
 /// All slabs of a region of points^3 that spans the mesh.
-Counts countGenerator(const SliceGenerator& generator, const SlabInputs& inputs,
+Counts countGenerator(const SliceGenerator& generator, const RasterInputs& inputs,
                       const PreparedRegion& region) {
     constexpr int kLayersASlab = 8;
     const ActiveElements active = listActiveElements(region, inputs.axes, kLayersASlab);
@@ -111,8 +111,8 @@ void count(const std::string& path, int points) {
     const NodeFrame frame = frameNodes(file.mesh, Lattice::axisParallel(bounds.min, spacing), {});
     std::vector<ChannelCoding> channels;
     if (!file.mesh.fields.empty()) channels.emplace_back(file.mesh.fields[0], 0, SampleFormat::r32f);
-    const SlabInputs inputs{file.mesh, frame, channels, SampleFormat::r32f,
-                            SliceAxes::along(chooseLayerAxis(file.mesh, frame, {}))};
+    const RasterInputs inputs{file.mesh, frame, channels, SampleFormat::r32f,
+                              SliceAxes::along(chooseLayerAxis(file.mesh, frame, {}))};
     std::vector<std::int32_t> all(std::size_t(file.mesh.elementCount()));
     std::iota(all.begin(), all.end(), 0);
     Execution execution;

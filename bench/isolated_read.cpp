@@ -18,7 +18,7 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "io/isolated_reader.h"
+#include "reader/isolated_reader.h"
 
 namespace {
 

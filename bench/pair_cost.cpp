@@ -22,7 +22,7 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "registry/registry.h"
 
 namespace {

@@ -1,3 +1,3 @@
-if(TARGET tessera_io)
-  tessera_program(uniform_for_error SOURCES uniform_for_error.cpp LINK io brick PRIVATE_LINK fmt::fmt)
+if(TARGET tessera_vdb)
+  tessera_program(uniform_for_error SOURCES uniform_for_error.cpp LINK reader vdb PRIVATE_LINK fmt::fmt)
 endif()

@@ -16,9 +16,9 @@
 
 #include "base/error.h"
 #include "base/execution.h"
-#include "io/read_mesh.h"
 #include "mesh/element_index.h"
 #include "mesh/nearest_point.h"
+#include "mesh_files/read_mesh.h"
 #include "refine/error_samples.h"
 
 namespace tessera {

@@ -9,7 +9,7 @@
 #include <filesystem>
 
 #include "contract_suite.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
 #include "registry/registry.h"
 

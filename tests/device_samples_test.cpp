@@ -1,4 +1,4 @@
-#include "slab/device_samples.h"
+#include "raster/device_samples.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 #include "gl/gl_platform.h"
 #include "gl_test_tools.h"
 #include "hybrid/hybrid_resampler.h"
+#include "raster/raster_device.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
-#include "slab/slab_device.h"
 #include "slicing/slicing_resampler.h"
 
 namespace tessera {
@@ -49,7 +49,7 @@ TEST_P(SamplesOnDevice, AreThoseThatAreReadBack) {
         const int components = group.channels == 1 ? 1 : 4;
         std::vector<float> codes(block.count() * std::size_t(components));
         std::vector<std::uint8_t> coverage(block.count());
-        sharedSlabDevice(GlPlatform::eglSurfaceless).thread().run([&](GlContext& context) {
+        sharedRasterDevice(GlPlatform::eglSurfaceless).thread().run([&](GlContext& context) {
             const GlFunctions& gl = context.functions();
             gl.GetTextureImage(group.codes.id(), 0, components == 1 ? GL_RED : GL_RGBA, GL_FLOAT,
                                GLsizei(codes.size() * 4), codes.data());

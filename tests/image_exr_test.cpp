@@ -1,4 +1,4 @@
-#include "io/image_exr.h"
+#include "pictures/image_exr.h"
 
 #include <ImathBox.h>
 #include <ImathVec.h>

@@ -1,4 +1,4 @@
-#include "io/image.h"
+#include "pictures/image.h"
 
 #include <gtest/gtest.h>
 #include <png.h>
@@ -10,7 +10,9 @@
 #include <limits>
 
 #include "base/error.h"
-#include "io/bitmap_font.h"
+#include "base/text.h"
+#include "pictures/bitmap_font.h"
+#include "pictures/sample_slice.h"
 
 namespace tessera {
 namespace {

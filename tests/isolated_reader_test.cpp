@@ -1,4 +1,4 @@
-#include "io/isolated_reader.h"
+#include "reader/isolated_reader.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -16,10 +16,12 @@
 #include <thread>
 
 #include "base/error.h"
-#include "io/input_file.h"
-#include "io/mesh_packet.h"
-#include "io/reader_report.h"
+#include "files/input_file.h"
 #include "mesh_test_tools.h"
+#include "reader/mesh_packet.h"
+#include "reader/reader_limits.h"
+#include "reader/reader_report.h"
+#include "reader/serve_mesh_reader.h"
 #include "vtu_text.h"
 
 namespace tessera {

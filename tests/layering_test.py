@@ -6,7 +6,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-HEAVY_FILES = 6  # .cpp files of src/io that may include OpenVDB, and as many that may include VTK
+HEAVY_FILES = 6  # .cpp files of a room that may include OpenVDB or VTK
 
 
 def read_table():
@@ -72,23 +72,46 @@ def check_links(rows, problems):
 
 
 def check_heavy(problems):
-    """Only src/io includes OpenVDB and VTK, in few translation units; its headers that do are its own and the tests'."""
+    """One room includes OpenVDB and one VTK, in few translation units; its headers that do are its own and the tests'."""
     def includes(path, pattern):
         return re.search(r"^\s*#\s*include\s*[<\"]" + pattern, path.read_text(), re.M)
 
     paths = [p for folder in ("src", "apps", "tests") for p in source_files(ROOT / folder)]
-    for library, pattern in (("OpenVDB", r"openvdb/"), ("VTK", r"vtk\w+\.h")):
-        heavy = [p for p in source_files(ROOT / "src/io") if p.suffix == ".h" and includes(p, pattern)]
+    for library, pattern, room in (("OpenVDB", r"(?:open|nano)vdb/", "vdb"), ("VTK", r"vtk\w+\.h", "mesh_files")):
+        heavy = [p for p in source_files(ROOT / "src" / room) if p.suffix == ".h" and includes(p, pattern)]
         for header in heavy:  # those included by an earlier one count through it
-            heavy += [p for p in source_files(ROOT / "src/io") if p.suffix == ".h" and p not in heavy and includes(p, "io/" + header.name)]
-        anyway = "(?:" + "|".join([pattern] + ["io/" + re.escape(p.name) for p in heavy]) + ")"
+            heavy += [p for p in source_files(ROOT / "src" / room) if p.suffix == ".h" and p not in heavy and includes(p, f"{room}/{header.name}")]
+        anyway = "(?:" + "|".join([pattern] + [f"{room}/" + re.escape(p.name) for p in heavy]) + ")"
         users = [p.relative_to(ROOT) for p in paths if includes(p, anyway)]
         for path in users:
-            if path.parts[:2] != ("src", "io") and path.parts[0] != "tests":
-                problems.append(f"{path} includes {library}; only src/io may")
+            if path.parts[:2] != ("src", room) and path.parts[0] != "tests":
+                problems.append(f"{path} includes {library}; only src/{room} may")
         units = [str(p) for p in users if p.parts[0] == "src" and p.suffix == ".cpp"]
         if len(units) > HEAVY_FILES:
-            problems.append(f"{library} is included in more than {HEAVY_FILES} files of src/io: {units}")
+            problems.append(f"{library} is included in more than {HEAVY_FILES} files of src/{room}: {units}")
+
+
+def check_headers(problems):
+    """Every source file of a room has the header of its name, and no header includes itself through others."""
+    includes = {}
+    for path in source_files(ROOT / "src"):
+        name = str(path.relative_to(ROOT / "src"))
+        if path.suffix == ".cpp" and not path.with_suffix(".h").is_file():
+            problems.append(f"src/{name} has no header of its name")
+        if path.suffix == ".h":
+            includes[name] = re.findall(r'^#include "([^"]+)"', path.read_text(), re.M)
+    done = set()
+
+    def visit(name, above):
+        if name in above:
+            problems.append("a circle of includes: " + " -> ".join(above[above.index(name):] + [name]))
+        elif name not in done:
+            for other in includes.get(name, []):
+                visit(other, above + [name])
+            done.add(name)
+
+    for name in includes:
+        visit(name, [])
 
 
 def main():
@@ -102,6 +125,7 @@ def main():
             problems.append(f"only {checked} source files found")
         check_links(rows, problems)
         check_heavy(problems)
+        check_headers(problems)
     for problem in problems:
         print(problem)
     print(f"layering: {len(problems)} problems")

@@ -4,7 +4,10 @@
 
 #include "brick_test_meshes.h"
 #include "brute_force_resampler.h"
+#include "refine/plan.h"
 #include "refine/refine.h"
+#include "refine/refine_options.h"
+#include "refine/resample_tree.h"
 
 namespace tessera {
 namespace {

@@ -1,11 +1,11 @@
-#include "io/mesh_series.h"
+#include "mesh_files/mesh_series.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "base/error.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 #include "vtu_text.h"
 

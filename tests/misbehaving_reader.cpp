@@ -20,9 +20,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/isolated_reader.h"
-#include "io/reader_process.h"
-#include "io/reader_report.h"
+#include "reader/isolated_reader.h"
+#include "reader/reader_process.h"
+#include "reader/reader_report.h"
+#include "reader/serve_mesh_reader.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
 #define NANOVDB_USE_BLOSC
-#include "io/nvdb_write.h"
+#include "vdb/nvdb_write.h"
 
 #include <iostream>  // before GridValidator.h, which lacks it
 
@@ -10,6 +10,8 @@
 #include <map>
 
 #include "base/error.h"
+#include "refine/brick_result.h"
+#include "vdb/vdb_write.h"
 #include "vdb_case.h"
 
 namespace tessera {

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 #include "reference/random.h"
 #include "vtu_text.h"

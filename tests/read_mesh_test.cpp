@@ -5,7 +5,8 @@
 #include <set>
 
 #include "base/error.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
+#include "mesh_files/write_tets.h"
 #include "mesh_test_tools.h"
 #include "vtu_text.h"
 

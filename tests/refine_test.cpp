@@ -5,6 +5,10 @@
 #include "base/error.h"
 #include "brick_test_meshes.h"
 #include "brute_force_resampler.h"
+#include "refine/brick_result.h"
+#include "refine/plan.h"
+#include "refine/refine_options.h"
+#include "refine/resample_tree.h"
 
 namespace tessera {
 namespace {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/timer.h"
-#include "io/read_mesh.h"
 #include "mesh/mesh_quality.h"
 #include "mesh/repair.h"
+#include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 
 // Real meshes: those in data/, and further ones where ../shared/data is there.

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "base/error.h"
-#include "io/isolated_reader.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
+#include "reader/isolated_reader.h"
 
 namespace tessera {
 namespace {

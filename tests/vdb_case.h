@@ -13,8 +13,9 @@
 #include <iterator>
 #include <limits>
 
-#include "io/openvdb_grids.h"
-#include "io/vdb_file.h"
+#include "refine/brick_result.h"
+#include "vdb/openvdb_grids.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 

@@ -1,8 +1,13 @@
 #include <atomic>
 
 #include "base/error.h"
-#include "io/atomic_file.h"
-#include "io/vdb_file.h"
+#include "files/atomic_file.h"
+#include "refine/brick_result.h"
+#include "refine/refine_options.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_metadata.h"
+#include "vdb/vdb_read.h"
+#include "vdb/vdb_write.h"
 #include "vdb_case.h"
 
 namespace tessera {

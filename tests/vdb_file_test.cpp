@@ -1,10 +1,14 @@
-#include "io/vdb_file.h"
-#include "io/shape_output.h"
+#include "vdb/vdb_file.h"
+#include "vdb/shape_output.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
 #include "base/error.h"
+#include "refine/brick_result.h"
+#include "refine/refine_options.h"
+#include "vdb/vdb_read.h"
+#include "vdb/vdb_write.h"
 #include "vdb_case.h"
 
 namespace tessera {

@@ -1,7 +1,10 @@
 #include <glm/vector_relational.hpp>
 
 #include "brick/flatten.h"
-#include "io/vdb_file.h"
+#include "refine/brick_result.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_read.h"
+#include "vdb/vdb_write.h"
 #include "vdb_case.h"
 
 namespace tessera {

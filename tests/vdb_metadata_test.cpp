@@ -1,9 +1,9 @@
-#include "io/vdb_metadata.h"
+#include "vdb/vdb_metadata.h"
 
 #include <gtest/gtest.h>
 
 #include "base/error.h"
-#include "io/report_json.h"
+#include "vdb/report_json.h"
 
 namespace tessera {
 namespace {

@@ -1,4 +1,4 @@
-#include "io/vti_write.h"
+#include "vdb/vti_write.h"
 
 #include <vtkCellData.h>
 #include <vtkDataArray.h>
@@ -13,6 +13,7 @@
 #include <atomic>
 
 #include "base/error.h"
+#include "refine/brick_result.h"
 #include "vdb_case.h"
 
 namespace tessera {

@@ -8,10 +8,11 @@
 #include "commands.h"
 #include "gl_report.h"
 #include "import_mesh.h"
-#include "io/vdb_file.h"
 #include "output_paths.h"
 #include "report_text.h"
 #include "series_steps.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_read.h"
 
 namespace tessera {
 

@@ -9,13 +9,15 @@
 
 #include "base/error.h"
 #include "commands.h"
+#include "files/atomic_file.h"
 #include "import_mesh.h"
-#include "io/atomic_file.h"
-#include "io/image.h"
-#include "io/vdb_file.h"
 #include "output_paths.h"
+#include "pictures/image.h"
+#include "pictures/sample_slice.h"
 #include "registry/registry.h"
 #include "report_text.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_read.h"
 
 namespace tessera {
 

@@ -2,8 +2,9 @@
 
 #include "base/timer.h"
 #include "commands.h"
+#include "files/atomic_file.h"
 #include "import_mesh.h"
-#include "io/atomic_file.h"
+#include "mesh_files/write_tets.h"
 #include "output_paths.h"
 #include "report_text.h"
 

@@ -7,13 +7,15 @@
 #include "base/timer.h"
 #include "commands.h"
 #include "import_mesh.h"
-#include "io/mesh_series.h"
-#include "io/outside_reader.h"
-#include "io/vdb_file.h"
+#include "mesh_files/mesh_series.h"
 #include "output_paths.h"
 #include "refine/measure_error.h"
 #include "registry/registry.h"
 #include "report_text.h"
+#include "vdb/outside_reader.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_read.h"
+#include "vdb/vdb_write.h"
 #include "verify/check_voxels.h"
 
 namespace tessera {

@@ -3,9 +3,10 @@
 #include <set>
 #include <string>
 
-#include "io/isolated_reader.h"
 #include "options.h"
 #include "progress.h"
+#include "reader/isolated_reader.h"
+#include "reader/reader_limits.h"
 
 namespace tessera {
 

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 
 namespace tessera {
 

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "io/vdb_file.h"
 #include "mesh/tet_mesh.h"
 #include "options.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/timer.h"
-#include "io/json_parse.h"
+#include "files/json_parse.h"
 #include "report_text.h"
 
 namespace tessera {

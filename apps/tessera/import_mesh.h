@@ -4,8 +4,8 @@
 #include <string>
 
 #include "commands.h"
-#include "io/read_mesh.h"
 #include "mesh/repair.h"
+#include "mesh_files/read_mesh.h"
 #include "run_report.h"
 
 namespace tessera {

@@ -12,8 +12,8 @@
 
 #include "base/error.h"
 #include "command_line.h"
+#include "files/atomic_file.h"
 #include "interrupt.h"
-#include "io/atomic_file.h"
 #include "progress.h"
 #include "report_text.h"
 

@@ -9,8 +9,9 @@
 #include <set>
 
 #include "base/error.h"
-#include "io/atomic_file.h"
+#include "files/atomic_file.h"
 #include "output_paths.h"
+#include "refine/refine_options.h"
 
 namespace tessera {
 

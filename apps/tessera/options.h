@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "base/vec.h"
-#include "io/output_formats.h"
-#include "io/shape_output.h"
-#include "io/vdb_file.h"
 #include "refine/refine.h"
+#include "refine/refine_options.h"
+#include "vdb/output_formats.h"
+#include "vdb/shape_output.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 

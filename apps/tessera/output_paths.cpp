@@ -8,8 +8,8 @@
 #include <map>
 
 #include "base/error.h"
-#include "io/atomic_file.h"
-#include "io/mesh_series.h"
+#include "files/atomic_file.h"
+#include "mesh_files/mesh_series.h"
 
 namespace tessera {
 

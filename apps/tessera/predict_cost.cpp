@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/timer.h"
+#include "refine/plan.h"
 
 namespace tessera {
 

@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "refine/plan.h"
 #include "refine/refine.h"
 #include "resample/resampler.h"
 

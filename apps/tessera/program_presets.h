@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "io/vdb_file.h"
 #include "options.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 

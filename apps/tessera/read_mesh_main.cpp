@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "io/isolated_reader.h"
+#include "reader/isolated_reader.h"
+#include "reader/serve_mesh_reader.h"
 
 int main(int argc, char** argv) {
     try {

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "io/name_list.h"
+#include "files/name_list.h"
+#include "refine/plan.h"
 
 namespace tessera {
 

@@ -6,6 +6,8 @@
 #include "run_report.h"
 #include "table_text.h"
 
+#include "refine/plan.h"
+
 namespace tessera {
 
 /// 1234567 -> "1,234,567".

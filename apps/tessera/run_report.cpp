@@ -8,8 +8,9 @@
 
 #include "base/error.h"
 #include "commands.h"
-#include "io/atomic_file.h"
-#include "io/report_json.h"
+#include "files/atomic_file.h"
+#include "refine/plan.h"
+#include "vdb/report_json.h"
 
 namespace tessera {
 

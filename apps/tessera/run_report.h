@@ -6,9 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "io/read_mesh.h"
-#include "io/vdb_file.h"
+#include "mesh_files/read_mesh.h"
+#include "refine/plan.h"
 #include "refine/refine.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 

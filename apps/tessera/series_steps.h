@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mesh_series.h"
+#include "mesh_files/mesh_series.h"
 #include "run_report.h"
 
 namespace tessera {

@@ -1,3 +1,5 @@
+#include "gl/egl_context.h"
+
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <dlfcn.h>

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "base/error.h"
+#include "gl/egl_context.h"
 #include "gl/gl_platform.h"
+#include "gl/osmesa_context.h"
 #include "gl/platform_context.h"
 
 namespace tessera {

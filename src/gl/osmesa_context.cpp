@@ -1,3 +1,5 @@
+#include "gl/osmesa_context.h"
+
 #include <dlfcn.h>
 
 #include <array>

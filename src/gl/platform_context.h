@@ -21,9 +21,4 @@ class PlatformContext {
     virtual bool isSoftwareDevice() const = 0;
 };
 
-/// Each throws GlError with the reason, in one sentence, when the platform gives no such context.
-std::unique_ptr<PlatformContext> createEglDeviceContext(bool debug);
-std::unique_ptr<PlatformContext> createEglSurfacelessContext(bool debug);
-std::unique_ptr<PlatformContext> createOsmesaContext();
-
 }  // namespace tessera

@@ -10,11 +10,11 @@ constexpr double kShareOfSlicing = 0.7;
 }  // namespace
 
 HybridResampler::HybridResampler()
-    : SlabResampler("hybrid", "marching-tetrahedra slice polygons filled by OpenGL", Method::arithmetic,
-                    std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
+    : RasterResampler("hybrid", "marching-tetrahedra slice polygons filled by OpenGL", Method::arithmetic,
+                      std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
 
 Hybrid2001Resampler::Hybrid2001Resampler()
-    : SlabResampler("hybrid-2001", "slice polygons filled by the fill rule, as published: misses points",
-                    Method::published, std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
+    : RasterResampler("hybrid-2001", "slice polygons filled by the fill rule, as published: misses points",
+                      Method::published, std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
 
 }  // namespace tessera

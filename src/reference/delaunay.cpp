@@ -1,3 +1,5 @@
+#include "reference/delaunay.h"
+
 // Based on: A. Bowyer, Computing Dirichlet tessellations, and D. F. Watson, Computing the n-dimensional
 // Delaunay tessellation with application to Voronoi polytopes, both The Computer Journal 24(2), 1981.
 // Predicates are filtered: double with a bound after J. R. Shewchuk, Adaptive Precision Floating-Point

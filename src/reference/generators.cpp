@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "mesh/geometry.h"
+#include "reference/delaunay.h"
 #include "reference/random.h"
 
 namespace tessera {

@@ -31,10 +31,6 @@ TetMesh boundaryLayerMesh(int n, double thinnest);
 /// A coarse box beside a fine one: fine nodes hang on the coarse faces.
 TetMesh hangingNodeMesh(int coarseCells, int fineCells);
 
-/// Delaunay tetrahedralisation (incremental, Bowyer and Watson 1981; exact predicates). Tets with a node of
-/// the enclosing tetrahedron are left out, so the hull isn't quite convex. @param points no duplicates,
-/// within 100 of the origin, not cospherical.
-TetMesh delaunayMesh(std::span<const Vec3d> points);
 /// Delaunay mesh of random points in the unit box with x = 1/2 + sign(2u - 1) |2u - 1|^power / 2.
 TetMesh gradedDelaunayMesh(int points, double power, std::uint64_t seed);
 

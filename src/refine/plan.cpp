@@ -1,3 +1,5 @@
+#include "refine/plan.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -5,6 +7,7 @@
 
 #include "base/error.h"
 #include "refine/plan_frame.h"
+#include "refine/refine_options.h"
 
 namespace tessera {
 

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "refine/refine_options.h"
 #include "refine/used_nodes.h"
 
 namespace tessera {

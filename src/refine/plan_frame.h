@@ -1,7 +1,7 @@
 #pragma once
 
 #include "refine/brick_plan.h"
-#include "refine/refine.h"
+#include "refine/refine_options.h"
 
 namespace tessera {
 

@@ -10,9 +10,12 @@
 #include "base/error.h"
 #include "base/timer.h"
 #include "brick/kept_points.h"
+#include "refine/brick_result.h"
 #include "refine/error_samples.h"
 #include "refine/measure_error.h"
+#include "refine/plan.h"
 #include "refine/plan_frame.h"
+#include "refine/refine_options.h"
 #include "refine/resample_tree.h"
 
 namespace tessera {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "slab/slice_batch.h"
+#include "raster/slice_batch.h"
 
 namespace tessera {
 

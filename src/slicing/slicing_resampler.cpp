@@ -5,11 +5,11 @@
 namespace tessera {
 
 SlicingResampler::SlicingResampler()
-    : SlabResampler("slicing", "substitute geometry on OpenGL, a distance test for every fragment",
-                    Method::arithmetic, std::make_unique<SilhouetteGenerator>()) {}
+    : RasterResampler("slicing", "substitute geometry on OpenGL, a distance test for every fragment",
+                      Method::arithmetic, std::make_unique<SilhouetteGenerator>()) {}
 
 Slicing2001Resampler::Slicing2001Resampler()
-    : SlabResampler("slicing-2001", "substitute geometry with an alpha test, as published: misses points",
-                    Method::published, std::make_unique<SilhouetteGenerator>()) {}
+    : RasterResampler("slicing-2001", "substitute geometry with an alpha test, as published: misses points",
+                      Method::published, std::make_unique<SilhouetteGenerator>()) {}
 
 }  // namespace tessera

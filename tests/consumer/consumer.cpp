@@ -2,7 +2,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "refine/brick_result.h"
 #include "refine/refine.h"
+#include "refine/refine_options.h"
 #include "registry/registry.h"
 
 int main() {

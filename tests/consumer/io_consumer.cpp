@@ -3,9 +3,12 @@
 #include <cstdio>
 #include <numeric>
 
-#include "io/isolated_reader.h"
-#include "io/vdb_file.h"
+#include "reader/isolated_reader.h"
+#include "refine/brick_result.h"
+#include "refine/refine.h"
 #include "registry/registry.h"
+#include "vdb/vdb_file.h"
+#include "vdb/vdb_write.h"
 
 int main(int argc, char** argv) {
     if (argc != 3) return 2;

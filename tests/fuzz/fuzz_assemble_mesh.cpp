@@ -8,7 +8,8 @@
 #include <string_view>
 
 #include "fuzz_tools.h"
-#include "io/raw_mesh.h"
+#include "mesh_files/assemble_mesh.h"
+#include "mesh_files/raw_mesh.h"
 
 namespace tessera {
 namespace {

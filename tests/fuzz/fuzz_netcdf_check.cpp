@@ -7,7 +7,7 @@
 #include <string>
 
 #include "fuzz_tools.h"
-#include "io/netcdf_check.h"
+#include "mesh_files/netcdf_check.h"
 
 namespace tessera {
 namespace {

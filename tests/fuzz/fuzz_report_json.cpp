@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "fuzz_tools.h"
-#include "io/report_json.h"
+#include "vdb/report_json.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,8 @@
 #include <string_view>
 
 #include "fuzz_tools.h"
-#include "io/read_tetgen.h"
+#include "mesh_files/assemble_mesh.h"
+#include "mesh_files/read_tetgen.h"
 
 namespace tessera {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/execution.h"
-#include "io/read_mesh.h"
+#include "mesh_files/read_mesh.h"
 
 namespace tessera::fuzz {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "fuzz_tools.h"
-#include "io/vdb_metadata.h"
+#include "vdb/vdb_metadata.h"
 
 namespace tessera {
 namespace {

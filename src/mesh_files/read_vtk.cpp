@@ -1,0 +1,259 @@
+#include "mesh_files/read_vtk.h"
+
+#include <vtkAlgorithm.h>
+#include <vtkDataArraySelection.h>
+#include <vtkDataObject.h>
+#include <vtkDataSetReader.h>
+#include <vtkInformation.h>
+#include <vtkNew.h>
+#include <vtkSmartPointer.h>
+#include <vtkStreamingDemandDrivenPipeline.h>
+#include <vtkXMLDataElement.h>
+#include <vtkXMLImageDataReader.h>
+#include <vtkXMLMultiBlockDataReader.h>
+#include <vtkXMLPImageDataReader.h>
+#include <vtkXMLPRectilinearGridReader.h>
+#include <vtkXMLPStructuredGridReader.h>
+#include <vtkXMLPUnstructuredGridReader.h>
+#include <vtkXMLRectilinearGridReader.h>
+#include <vtkXMLStructuredGridReader.h>
+#include <vtkXMLUnstructuredGridReader.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <new>
+#include <set>
+#include <string_view>
+
+#include "base/error.h"
+#include "files/name_list.h"
+#include "mesh_files/legacy_check.h"
+#include "mesh_files/vtk_convert.h"
+#include "mesh_files/vtk_messages.h"
+#include "mesh_files/vtk_source.h"
+#include "mesh_files/xml_check.h"
+
+namespace tessera {
+
+namespace {
+
+/// Visits the arrays of one <PointData> or <CellData>.
+void renameArrays(vtkXMLDataElement* attributes, RenamedFields& renamed) {
+    std::set<std::string> taken;
+    const int count = attributes->GetNumberOfNestedElements();
+    for (int i = 0; i < count; ++i)
+        if (const char* name = attributes->GetNestedElement(i)->GetAttribute("Name")) taken.insert(name);
+    std::set<std::string> seen;
+    for (int i = 0; i < count; ++i) {
+        vtkXMLDataElement* array = attributes->GetNestedElement(i);
+        const char* given = array->GetAttribute("Name");
+        if (!given || seen.insert(given).second) continue;
+        const std::string name = given;
+        std::string unique;
+        for (int number = 2; unique.empty() || !taken.insert(unique).second; ++number)
+            unique = name + "_" + std::to_string(number);
+        array->SetAttribute("Name", unique.c_str());
+        seen.insert(unique);
+        if (std::find(renamed.newNames.begin(), renamed.newNames.end(), unique) != renamed.newNames.end())
+            continue;  // in another piece, or of the points too
+        renamed.newNames.push_back(unique);
+        if (std::find(renamed.names.begin(), renamed.names.end(), name) == renamed.names.end())
+            renamed.names.push_back(name);
+    }
+}
+
+/// Gives every array of points, and of cells, a name of its own: the second T becomes T_2 in every piece.
+void makeNamesUnique(vtkXMLDataElement* element, RenamedFields& renamed) {
+    const std::string_view name = element->GetName() ? element->GetName() : "";
+    if (name == "PointData" || name == "CellData") return renameArrays(element, renamed);
+    for (int i = 0; i < element->GetNumberOfNestedElements(); ++i)
+        makeNamesUnique(element->GetNestedElement(i), renamed);
+}
+
+/// A reader of VTK's that meets unique names only. VTK keeps arrays by name but counts those in the file, so
+/// of two of one name it loses one, and gives others wrong values or crashes.
+template <class Reader>
+class UniqueNames : public Reader {
+  public:
+    static vtkSmartPointer<UniqueNames> create(std::shared_ptr<RenamedFields> renamed) {
+        auto reader = vtkSmartPointer<UniqueNames>::Take(new UniqueNames);
+        reader->InitializeObjectBase();
+        reader->renamed_ = std::move(renamed);
+        return reader;
+    }
+
+  protected:
+    int ReadVTKFile(vtkXMLDataElement* file) override {
+        makeNamesUnique(file, *renamed_);
+        return Reader::ReadVTKFile(file);
+    }
+
+  private:
+    std::shared_ptr<RenamedFields> renamed_;
+};
+
+struct XmlReaderKind {
+    const char* type;         // attribute of <VTKFile>
+    const char* description;  // for the user
+    vtkSmartPointer<vtkXMLReader> (*make)(const std::shared_ptr<RenamedFields>& renamed);
+};
+
+template <class Reader>
+vtkSmartPointer<vtkXMLReader> makeXmlReader(const std::shared_ptr<RenamedFields>& renamed) {
+    return UniqueNames<Reader>::create(renamed);
+}
+
+const XmlReaderKind kXmlReaders[] = {
+    {"UnstructuredGrid", "VTK XML unstructured grid", makeXmlReader<vtkXMLUnstructuredGridReader>},
+    {"PUnstructuredGrid", "VTK XML parallel unstructured grid", makeXmlReader<vtkXMLPUnstructuredGridReader>},
+    {"StructuredGrid", "VTK XML structured grid", makeXmlReader<vtkXMLStructuredGridReader>},
+    {"PStructuredGrid", "VTK XML parallel structured grid", makeXmlReader<vtkXMLPStructuredGridReader>},
+    {"RectilinearGrid", "VTK XML rectilinear grid", makeXmlReader<vtkXMLRectilinearGridReader>},
+    {"PRectilinearGrid", "VTK XML parallel rectilinear grid", makeXmlReader<vtkXMLPRectilinearGridReader>},
+    {"ImageData", "VTK XML image data", makeXmlReader<vtkXMLImageDataReader>},
+    {"PImageData", "VTK XML parallel image data", makeXmlReader<vtkXMLPImageDataReader>},
+    {"vtkMultiBlockDataSet", "VTK XML multi-block", makeXmlReader<vtkXMLMultiBlockDataReader>},
+};
+
+/// Leaves out arrays that nobody asked for. Their names stay known, for messages.
+void selectArrays(vtkDataArraySelection* selection, FieldLocation location, const ReadOptions& options,
+                  std::vector<ArrayInfo>& unread) {
+    if (!selection || options.fields.empty()) return;
+    for (int a = 0; a < selection->GetNumberOfArrays(); ++a) {
+        const std::string name = selection->GetArrayName(a) ? selection->GetArrayName(a) : "";
+        if (name.empty() || name.starts_with("vtk") || isWanted(options, name, location)) continue;
+        selection->DisableArray(name.c_str());
+        unread.push_back({name, location, 1, true});
+    }
+}
+
+VtkSource openXml(const std::string& path, const DeclaredSize& info) {
+    for (const XmlReaderKind& kind : kXmlReaders) {
+        if (info.type != kind.type) continue;
+        const auto renamed = std::make_shared<RenamedFields>();
+        auto reader = kind.make(renamed);
+        reader->SetFileName(path.c_str());
+        return {reader, kind.description, {}, {}, renamed};
+    }
+    throw InputError(
+        path + ": VTK XML files of type '" + info.type + "' hold no mesh that can be read here" +
+        (info.type == "Collection" ? "; name one of its files, or resample the .pvd as a series" : ""));
+}
+
+VtkSource openLegacy(const std::string& path) {
+    auto reader = vtkSmartPointer<vtkDataSetReader>::New();
+    reader->SetFileName(path.c_str());
+    reader->ReadAllScalarsOn();
+    reader->ReadAllVectorsOn();
+    reader->ReadAllNormalsOn();
+    reader->ReadAllTensorsOn();
+    reader->ReadAllColorScalarsOn();
+    reader->ReadAllTCoordsOn();
+    reader->ReadAllFieldsOn();
+    return {reader, "VTK legacy"};
+}
+
+/// Runs the reader for the time step that the options choose.
+void update(const std::string& path, vtkAlgorithm* reader, const ReadOptions& options) {
+    reader->UpdateInformation();
+    vtkInformation* information = reader->GetOutputInformation(0);
+    const int steps = information && information->Has(vtkStreamingDemandDrivenPipeline::TIME_STEPS())
+                          ? information->Length(vtkStreamingDemandDrivenPipeline::TIME_STEPS())
+                          : 0;
+    if (options.timeStep >= std::max(steps, 1))
+        throw InputError(path + ": there is no time step " + std::to_string(options.timeStep) + "; it has " +
+                         std::to_string(std::max(steps, 1)) + ", counted from 0");
+    if (steps == 0) {
+        reader->Update();
+        return;
+    }
+    const double* times = information->Get(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
+    reader->UpdateTimeStep(times[options.timeStep < 0 ? steps - 1 : options.timeStep]);
+}
+
+void throwOnErrors(const std::string& path, const VtkMessages& messages) {
+    std::vector<std::string> errors = messages.errors();
+    // The legacy reader only warns when an array ends early.
+    for (const std::string& warning : messages.warnings())
+        if (warning.find("Error reading") != std::string::npos) errors.push_back(warning);
+    if (!errors.empty()) throw InputError(path + ": damaged or not readable: " + errors.front());
+}
+
+/// A reader may say the same for every cell.
+void addVtkWarnings(const std::vector<std::string>& all, ImportStatistics& statistics) {
+    std::map<std::string, int> counts;
+    for (const std::string& warning : all) ++counts[warning];
+    for (const auto& [warning, count] : counts)
+        statistics.warnings.push_back("VTK: " + warning +
+                                      (count > 1 ? " (" + std::to_string(count) + " times)" : ""));
+}
+
+/// Nothing of what a file holds changes its name without a word.
+void warnOfRenamed(const RenamedFields& renamed, ImportStatistics& statistics) {
+    if (renamed.names.empty()) return;
+    statistics.warnings.push_back((renamed.names.size() == 1 ? "More than one field is" : "Fields are") +
+                                  std::string(" called ") + nameList(renamed.names) +
+                                  "; those behind the first are called " + nameList(renamed.newNames) +
+                                  " here.");
+}
+
+void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObject* data) {
+    if (info.type != "UnstructuredGrid") return;
+    const auto points = std::int64_t(data->GetNumberOfElements(vtkDataObject::POINT));
+    const auto cells = std::int64_t(data->GetNumberOfElements(vtkDataObject::CELL));
+    if (points != info.points || cells != info.cells)
+        throw InputError(path + ": damaged or cut off: it declares " + std::to_string(info.points) +
+                         " points and " + std::to_string(info.cells) + " cells, " + std::to_string(points) +
+                         " and " + std::to_string(cells) + " could be read");
+}
+
+RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options,
+             const Execution& execution, OpenVtkFormat openOther) {
+    RawMesh raw;
+    DeclaredSize info;
+    if (format == VtkFormat::xml) info = checkXmlFile(path);
+    if (format == VtkFormat::legacy) checkLegacyFile(path);
+    const VtkMessages messages;
+    VtkSource opened = format == VtkFormat::xml      ? openXml(path, info)
+                       : format == VtkFormat::legacy ? openLegacy(path)
+                                                     : openOther(path, format);
+    std::vector<ArrayInfo> unread;
+    if (auto* xml = vtkXMLReader::SafeDownCast(opened.reader)) {
+        xml->UpdateInformation();
+        selectArrays(xml->GetPointDataArraySelection(), FieldLocation::point, options, unread);
+        selectArrays(xml->GetCellDataArraySelection(), FieldLocation::cell, options, unread);
+    }
+    throwOnErrors(path, messages);
+    update(path, opened.reader, options);
+    throwOnErrors(path, messages);
+    vtkDataObject* data = opened.reader->GetOutputDataObject(0);
+    if (!data) throw InputError(path + ": could not be read as " + opened.format);
+    if (format == VtkFormat::xml) checkCounts(path, info, data);
+    raw.statistics.format = opened.format;
+    raw.statistics.warnings = opened.warnings;
+    if (opened.renamed) warnOfRenamed(*opened.renamed, raw.statistics);
+    appendVtkData(path, data, opened.nodeIds, options, execution, raw);
+    throwOnErrors(path, messages);
+    addVtkWarnings(messages.warnings(), raw.statistics);
+    if (!raw.blocks.empty())
+        raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
+    return raw;
+}
+
+}  // namespace
+
+RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
+                const Execution& execution, OpenVtkFormat openOther) {
+    if (!openOther && format != VtkFormat::xml && format != VtkFormat::legacy)
+        throw OtherFormatError(path + ": only VTK XML, legacy VTK and TetGen files are read here");
+    try {
+        return read(path, format, options, execution, openOther);
+    } catch (const std::bad_alloc&) {
+        throw TooLargeError(path + ": damaged or too large: reading it asked for more memory than there is");
+    } catch (const std::length_error&) {
+        throw InputError(path + ": damaged: it declares an impossible size");
+    }
+}
+
+}  // namespace tessera

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/execution.h"
+#include "brick/seams.h"
+
+namespace tessera {
+
+/// A picture of one number a pixel, row by row from the top left.
+struct ScalarImage {
+    int width = 0;
+    int height = 0;
+    std::vector<float> values;           ///< width x height
+    std::vector<std::uint8_t> coverage;  ///< width x height: 0 where the pixel has no value
+    std::vector<std::uint8_t>
+        outlines;  ///< width x height, or empty: 1 where a brick's edge is drawn over it
+
+    std::size_t offset(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
+};
+
+/// 8 bits of red, green and blue a pixel, row by row from the top left.
+struct RgbImage {
+    int width = 0;
+    int height = 0;
+    std::vector<std::uint8_t> rgb;
+};
+
+struct Rgb {
+    std::uint8_t r = 0, g = 0, b = 0;
+    friend bool operator==(const Rgb&, const Rgb&) = default;
+};
+
+/// Colour of a share in [0, 1] (clamped): dark blue over green to yellow, its lightness (CIE L*) rising
+/// evenly so that equal steps of the value look equally large, also in grey.
+Rgb mapColour(double share);
+
+struct PictureOptions {
+    std::string title;        ///< shown above the picture
+    double min = 0, max = 0;  ///< range of the colours; equal: the range of the finite values
+    int magnify = 1;          ///< picture pixels along a value's edge
+};
+
+/// The values in colours, a light pattern where there are none, the title, and a colour bar with five
+/// labelled ticks.
+RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options);
+
+/// Throws IoError; nothing stands at `path` until the file is whole.
+void writePng(const std::string& path, const RgbImage& image);
+/// drawPicture and writePng in one.
+void writeSlicePng(const std::string& path, const ScalarImage& image, const PictureOptions& options);
+
+}  // namespace tessera

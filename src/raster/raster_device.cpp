@@ -1,0 +1,435 @@
+#include "raster/raster_device.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "gl/gl_platform.h"
+#include "raster/hard_elements.h"
+#include "raster/shaders.h"
+
+namespace tessera {
+
+namespace {
+
+/// Sprites may hang over a region's upper edges by less than their own edge.
+constexpr int kPadding = kSmallExtent + 2;
+/// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
+constexpr const char* kDepthScale = "1.220703125e-4";
+constexpr GLenum kFragmentInvocations = 0x82F4;  // GL_ARB_pipeline_statistics_query
+
+int levelsOf(SampleFormat format) {
+    if (format == SampleFormat::r8) return 255;
+    return format == SampleFormat::r16 ? 65535 : 0;
+}
+
+GLenum internalFormat(SampleFormat format, int channels) {
+    const bool isOne = channels == 1;
+    switch (format) {
+        case SampleFormat::r32f:
+            return isOne ? GL_R32F : GL_RGBA32F;
+        case SampleFormat::r16f:
+            return isOne ? GL_R16F : GL_RGBA16F;
+        case SampleFormat::r16:
+            return isOne ? GL_R16 : GL_RGBA16;
+        case SampleFormat::r8:
+            return isOne ? GL_R8 : GL_RGBA8;
+    }
+    return GL_R32F;
+}
+
+/// Counts while it lives: a query that stays open after a failure would keep all others from beginning.
+class FragmentCount {
+  public:
+    explicit FragmentCount(GlQuery* query) : query_(query) {
+        if (query_) query_->begin();
+    }
+    ~FragmentCount() {
+        if (query_) query_->end();
+    }
+    FragmentCount(const FragmentCount&) = delete;
+
+  private:
+    GlQuery* query_;
+};
+
+}  // namespace
+
+RasterDevice::RasterDevice(GlThread& thread)
+    : thread_(thread),
+      isLayered_(thread.info().hasVertexShaderLayer),
+      countsFragments_(std::ranges::count(thread.info().extensions, "GL_ARB_pipeline_statistics_query") > 0) {
+    const double most = thread.info().limits.maxPointSize;
+    if (most < kSmallExtent + 1)
+        throw GlError("the largest points of this device have " + std::to_string(int(most)) +
+                      " pixels; sampling needs " + std::to_string(kSmallExtent + 1));
+}
+
+GLuint RasterDevice::upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count) {
+    const Timer timer;
+    stream.filled = stream.next;
+    stream.next = (stream.next + 1) % stream.slots.size();
+    Stream::Slot& slot = stream.slots[stream.filled];
+    if (slot.read) slot.read.wait();
+    slot.read.reset();
+    if (slot.buffer.bytes() < std::int64_t(count) || !slot.buffer) {
+        constexpr GLbitfield kMapping = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+        const std::int64_t size = std::max<std::int64_t>(std::int64_t(count) + std::int64_t(count) / 2, 4096);
+        slot.buffer = GlBuffer();
+        GlBuffer made(context, size, kMapping);
+        slot.mapped = made.map(0, size, kMapping);
+        slot.buffer = std::move(made);
+    }
+    if (count > 0) std::memcpy(slot.mapped, bytes, count);
+    counts_.uploadBytes += std::int64_t(count);
+    counts_.uploadMs += timer.elapsedMs();
+    return slot.buffer.id();
+}
+
+void RasterDevice::release(GlContext& context, Stream& stream) {
+    stream.slots[stream.filled].read = GlFence(context);
+}
+
+const GlProgram& RasterDevice::program(GlContext& context, const Variant& variant) {
+    const auto found = programs_.find(variant);
+    if (found != programs_.end()) return found->second;
+    namespace text = shaders::raster;
+    std::vector<ShaderDefine> defines{{"CHANNELS", std::to_string(variant.channels)},
+                                      {"DEPTH_SCALE", kDepthScale}};
+    if (variant.levels > 0) defines.push_back({"LEVELS", std::to_string(variant.levels)});
+    if (variant.isThin) defines.push_back({"THIN"});
+    if (variant.stage == Stage::sprites) defines.push_back({"SPRITE"});
+    if (isLayered_) defines.push_back({"LAYERED"});
+    if (variant.stage == Stage::silhouettes) defines.push_back({"SILHOUETTE"});
+    const bool isPublished = variant.stage == Stage::silhouettes || variant.stage == Stage::gouraud;
+    GlProgram made =
+        isPublished ? makeProgram(context,
+                                  {{GL_VERTEX_SHADER, text::kPublishedVertex},
+                                   {GL_FRAGMENT_SHADER, text::kPublishedFragment, {text::kSampleOutput}}},
+                                  defines)
+        : variant.stage == Stage::points
+            ? makeProgram(context,
+                          {{GL_VERTEX_SHADER, text::kPointVertex},
+                           {GL_FRAGMENT_SHADER, text::kPointFragment, {text::kSampleOutput}}},
+                          defines)
+            : makeProgram(
+                  context,
+                  {{GL_VERTEX_SHADER, text::kElementVertex, {text::kRecord}},
+                   {GL_FRAGMENT_SHADER, text::kElementFragment, {text::kRecord, text::kSampleOutput}}},
+                  defines);
+    return programs_.emplace(variant, std::move(made)).first->second;
+}
+
+void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size) {
+    const GLenum format = internalFormat(format_, channels_);
+    const bool fits = target_.format == format && target_.size.x >= size.x && target_.size.y >= size.y &&
+                      target_.size.z >= size.z;
+    if (fits) return;
+    const Vec3i room = target_.format == format ? glm::max(size, target_.size) : size;
+    // The old one goes first, for its memory; the new one counts once it is whole.
+    target_ = Target();
+    Target made;
+    made.size = room;
+    made.format = format;
+    made.framebuffer = GlFramebuffer(context);
+    made.codes = GlTexture(context, GL_TEXTURE_3D, format, room.x, room.y, room.z);
+    made.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
+    if (needsCoverageTarget(format_))
+        made.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, room.x, room.y, room.z);
+    if (isLayered_) {
+        made.framebuffer.attach(GL_COLOR_ATTACHMENT0, made.codes);
+        made.framebuffer.attach(GL_DEPTH_ATTACHMENT, made.depth);
+        if (made.coverage) made.framebuffer.attach(GL_COLOR_ATTACHMENT1, made.coverage);
+        const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+        context.functions().NamedFramebufferDrawBuffers(made.framebuffer.id(), made.coverage ? 2 : 1,
+                                                        buffers);
+        made.framebuffer.throwIfIncomplete();
+    }
+    target_ = std::move(made);
+}
+
+void RasterDevice::clear(GlContext& context) {
+    const GlFunctions& gl = context.functions();
+    const float mark = sampleMarks(format_).uncovered;
+    const float codes[4] = {mark, mark, mark, mark}, zero[4] = {0, 0, 0, 0};
+    const GLenum layout = channels_ == 1 ? GL_RED : GL_RGBA;
+    gl.ClearTexSubImage(target_.codes.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, layout, GL_FLOAT, codes);
+    gl.ClearTexSubImage(target_.depth.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, GL_DEPTH_COMPONENT,
+                        GL_FLOAT, zero);
+    if (target_.coverage)
+        gl.ClearTexSubImage(target_.coverage.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, GL_RED, GL_FLOAT,
+                            zero);
+}
+
+void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
+                         std::size_t pass) {
+    axes_ = inputs.axes;
+    format_ = inputs.format;
+    channels_ = inputs.recordedChannels(pass);
+    usedQueries_ = 0;  // of a region that was broken off
+    const Vec3i size = region.points.size();
+    size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
+    prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0));
+    clear(context);
+    // Geometry stays where the first pass put it.
+    if (!region.easy.geometry.empty()) {
+        if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
+        upload(context, easyChannels_, region.easy.channels[pass]);
+    }
+    if (!region.thin.geometry.empty()) {
+        if (pass == 0) upload(context, thinGeometry_, region.thin.geometry);
+        upload(context, thinChannels_, region.thin.channels[pass]);
+    }
+    if (!region.published.empty()) {
+        if (pass == 0) upload(context, published_, region.published);
+        upload(context, nodeCodes_, region.nodeCodes[pass]);
+    }
+}
+
+void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
+                                  const std::function<void()>& draw) {
+    const GlFunctions& gl = context.functions();
+    const GlProgram& used = program(context, variant);
+    gl.UseProgram(used.id());
+    gl.BindVertexArray(array.id());
+    // The viewport holds the padding too, so that the centres of overhanging sprites lie in it.
+    const Vec3i room = size_ + Vec3i(kPadding, kPadding, 0);
+    gl.Viewport(0, 0, room.x, room.y);
+    gl.ProgramUniform2f(used.id(), used.uniform("clipFromPixel"), 2.0f / float(room.x), 2.0f / float(room.y));
+    gl.ProgramUniform1i(used.id(), used.uniform("layerAxis"), axes_.l);
+    const bool isPublished = variant.stage == Stage::silhouettes || variant.stage == Stage::gouraud;
+    if (!isPublished) gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_GREATER);
+    gl.Enable(GL_PROGRAM_POINT_SIZE);
+    gl.ProvokingVertex(GL_FIRST_VERTEX_CONVENTION);
+    gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target_.framebuffer.id());
+    if (isLayered_) {
+        draw();
+        return;
+    }
+    const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    for (int layer = 0; layer < size_.z; ++layer) {
+        target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT0, target_.codes, layer);
+        target_.framebuffer.attachLayer(GL_DEPTH_ATTACHMENT, target_.depth, layer);
+        if (target_.coverage) target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT1, target_.coverage, layer);
+        gl.NamedFramebufferDrawBuffers(target_.framebuffer.id(), target_.coverage ? 2 : 1, buffers);
+        gl.ProgramUniform1i(used.id(), used.uniform("onlyLayer"), layer);
+        draw();
+    }
+}
+
+void RasterDevice::drawList(GlContext& context, const PrimitiveList& list, bool isThin) {
+    const GlFunctions& gl = context.functions();
+    const Stream& geometry = isThin ? thinGeometry_ : easyGeometry_;
+    const Stream& channels = isThin ? thinChannels_ : easyChannels_;
+    if (list.sprites.empty() && list.indices.empty()) return;
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, channels.slots[channels.filled].buffer.id());
+    Variant variant{Stage::sprites, isThin, channels_, levelsOf(format_)};
+    if (!list.sprites.empty()) {
+        if (!spriteArray_) {
+            spriteArray_ = GlVertexArray(context);
+            gl.EnableVertexArrayAttrib(spriteArray_.id(), 0);
+            gl.VertexArrayAttribIFormat(spriteArray_.id(), 0, 3, GL_UNSIGNED_INT, 0);
+            gl.VertexArrayAttribBinding(spriteArray_.id(), 0, 0);
+        }
+        const GLuint buffer = upload(context, vertices_, list.sprites);
+        gl.VertexArrayVertexBuffer(spriteArray_.id(), 0, buffer, 0, sizeof(Sprite));
+        drawPrimitives(context, variant, spriteArray_,
+                       [&] { gl.DrawArrays(GL_POINTS, 0, GLsizei(list.sprites.size())); });
+        counts_.vertices += std::int64_t(list.sprites.size());
+        release(context, vertices_);
+    }
+    if (!list.indices.empty()) {
+        variant.stage = Stage::polygons;
+        if (!polygonArray_) {
+            polygonArray_ = GlVertexArray(context);
+            const GLuint array = polygonArray_.id();
+            gl.EnableVertexArrayAttrib(array, 0);
+            gl.VertexArrayAttribFormat(array, 0, 2, GL_FLOAT, GL_FALSE, 0);
+            gl.VertexArrayAttribBinding(array, 0, 0);
+            gl.EnableVertexArrayAttrib(array, 1);
+            gl.VertexArrayAttribIFormat(array, 1, 2, GL_UNSIGNED_INT, offsetof(PolygonVertex, record));
+            gl.VertexArrayAttribBinding(array, 1, 0);
+        }
+        const GLuint buffer = upload(context, vertices_, list.vertices);
+        gl.VertexArrayVertexBuffer(polygonArray_.id(), 0, buffer, 0, sizeof(PolygonVertex));
+        gl.VertexArrayElementBuffer(polygonArray_.id(), upload(context, indices_, list.indices));
+        drawPrimitives(context, variant, polygonArray_, [&] {
+            gl.DrawElements(GL_TRIANGLES, GLsizei(list.indices.size()), GL_UNSIGNED_INT, nullptr);
+        });
+        counts_.vertices += std::int64_t(list.vertices.size());
+        release(context, vertices_);
+        release(context, indices_);
+    }
+}
+
+void RasterDevice::makeAlphaTexture(GlContext& context) {
+    // Opaque but for a border of one texel, which the lookup is clamped to outside.
+    constexpr int kSize = 66;
+    std::vector<std::uint8_t> alpha(kSize * kSize, 0);
+    for (int y = 1; y + 1 < kSize; ++y)
+        std::fill_n(alpha.begin() + y * kSize + 1, kSize - 2, std::uint8_t(255));
+    alphaTexture_ = GlTexture(context, GL_TEXTURE_2D, GL_R8, kSize, kSize);
+    context.functions().TextureSubImage2D(alphaTexture_.id(), 0, 0, 0, kSize, kSize, GL_RED, GL_UNSIGNED_BYTE,
+                                          alpha.data());
+}
+
+void RasterDevice::drawPublished(GlContext& context, const PublishedList& list) {
+    if (list.indices.empty()) return;
+    const GlFunctions& gl = context.functions();
+    const bool isSilhouette = !list.silhouettes.empty();
+    if (!alphaTexture_) {
+        makeAlphaTexture(context);
+        silhouetteArray_ = GlVertexArray(context);
+        gl.EnableVertexArrayAttrib(silhouetteArray_.id(), 0);
+        gl.VertexArrayAttribIFormat(silhouetteArray_.id(), 0, 2, GL_UNSIGNED_INT, 0);
+        gl.VertexArrayAttribBinding(silhouetteArray_.id(), 0, 0);
+        gouraudArray_ = GlVertexArray(context);
+        const GLuint array = gouraudArray_.id();
+        gl.VertexArrayAttribFormat(array, 0, 2, GL_FLOAT, GL_FALSE, 0);
+        gl.VertexArrayAttribIFormat(array, 1, 1, GL_UNSIGNED_INT, offsetof(GouraudCorner, layer));
+        gl.VertexArrayAttribFormat(array, 2, 4, GL_FLOAT, GL_FALSE, offsetof(GouraudCorner, codes));
+        for (GLuint a = 0; a < 3; ++a) {
+            gl.EnableVertexArrayAttrib(array, a);
+            gl.VertexArrayAttribBinding(array, a, 0);
+        }
+    }
+    const GlVertexArray& array = isSilhouette ? silhouetteArray_ : gouraudArray_;
+    if (isSilhouette) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, published_.slots[published_.filled].buffer.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, nodeCodes_.slots[nodeCodes_.filled].buffer.id());
+        gl.BindTextureUnit(0, alphaTexture_.id());
+        gl.VertexArrayVertexBuffer(array.id(), 0, upload(context, vertices_, list.silhouettes), 0,
+                                   sizeof(SilhouetteCorner));
+    } else {
+        gl.VertexArrayVertexBuffer(array.id(), 0, upload(context, vertices_, list.polygons), 0,
+                                   sizeof(GouraudCorner));
+    }
+    gl.VertexArrayElementBuffer(array.id(), upload(context, indices_, list.indices));
+    drawPrimitives(
+        context, {isSilhouette ? Stage::silhouettes : Stage::gouraud, false, channels_, levelsOf(format_)},
+        array,
+        [&] { gl.DrawElements(GL_TRIANGLES, GLsizei(list.indices.size()), GL_UNSIGNED_INT, nullptr); });
+    counts_.vertices += std::int64_t(list.silhouettes.size() + list.polygons.size());
+    release(context, vertices_);
+    release(context, indices_);
+}
+
+void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
+    // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
+    const GlFunctions& gl = context.functions();
+    if (usedQueries_ == timers_.size())
+        timers_.push_back({GlQuery(context, GL_TIMESTAMP), GlQuery(context, GL_TIMESTAMP)});
+    if (countsFragments_ && usedQueries_ == fragmentCounters_.size())
+        fragmentCounters_.emplace_back(context, kFragmentInvocations);
+    gl.QueryCounter(timers_[usedQueries_][0].id(), GL_TIMESTAMP);
+    {
+        const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
+        drawList(context, batch.easy, false);
+        drawList(context, batch.thin, true);
+        drawPublished(context, batch.published);
+    }
+    gl.QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
+    ++usedQueries_;
+}
+
+void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& points) {
+    if (points.empty()) return;
+    const GlFunctions& gl = context.functions();
+    if (!pointArray_) {
+        pointArray_ = GlVertexArray(context);
+        const GLuint array = pointArray_.id();
+        gl.VertexArrayAttribIFormat(array, 0, 2, GL_UNSIGNED_INT, 0);
+        gl.VertexArrayAttribFormat(array, 1, 1, GL_FLOAT, GL_FALSE, offsetof(DecidedPoint, depth));
+        gl.VertexArrayAttribFormat(array, 2, 4, GL_FLOAT, GL_FALSE, offsetof(DecidedPoint, codes));
+        for (GLuint a = 0; a < 3; ++a) {
+            gl.EnableVertexArrayAttrib(array, a);
+            gl.VertexArrayAttribBinding(array, a, 0);
+        }
+    }
+    gl.VertexArrayVertexBuffer(pointArray_.id(), 0, upload(context, vertices_, points), 0,
+                               sizeof(DecidedPoint));
+    drawPrimitives(context, {Stage::points, false, channels_, levelsOf(format_)}, pointArray_,
+                   [&] { gl.DrawArrays(GL_POINTS, 0, GLsizei(points.size())); });
+    counts_.vertices += std::int64_t(points.size());
+    release(context, vertices_);
+}
+
+void RasterDevice::finishRegion(GlContext& context) {
+    for (Stream* stream :
+         {&easyGeometry_, &easyChannels_, &thinGeometry_, &thinChannels_, &published_, &nodeCodes_})
+        if (stream->slots[stream->filled].buffer) release(context, *stream);
+    for (std::size_t q = 0; q < usedQueries_; ++q) {
+        counts_.renderMs += double(timers_[q][1].result() - timers_[q][0].result()) * 1e-6;
+        if (countsFragments_) counts_.fragments += std::int64_t(fragmentCounters_[q].result());
+    }
+    usedQueries_ = 0;
+}
+
+RasterImage RasterDevice::readBack(GlContext& context) {
+    const GlFunctions& gl = context.functions();
+    finishRegion(context);
+    const Timer timer;
+    RasterImage image;
+    image.components = channels_ == 1 ? 1 : 4;
+    const auto pixels = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
+    image.codes.resize(pixels * std::size_t(image.components));
+    gl.GetTextureSubImage(target_.codes.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z,
+                          image.components == 1 ? GL_RED : GL_RGBA, GL_FLOAT,
+                          GLsizei(image.codes.size() * sizeof(float)), image.codes.data());
+    if (target_.coverage) {
+        image.coverage.resize(pixels);
+        gl.GetTextureSubImage(target_.coverage.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, GL_RED,
+                              GL_UNSIGNED_BYTE, GLsizei(pixels), image.coverage.data());
+    }
+    counts_.readBackMs += timer.elapsedMs();
+    counts_.readBackBytes += std::int64_t(image.codes.size() * sizeof(float) + image.coverage.size());
+    return image;
+}
+
+void RasterDevice::addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format) {
+    const GlFunctions& gl = context.functions();
+    const Vec3i size = glm::max(samples.box.size(), Vec3i(1));
+    DeviceSamples::Group group;
+    group.channels = channels;
+    const int recorded = std::max(1, channels);
+    group.codes = GlTexture(context, GL_TEXTURE_3D, internalFormat(format, recorded), size.x, size.y, size.z);
+    const float mark = sampleMarks(format).uncovered;
+    const float codes[4] = {mark, mark, mark, mark}, zero[4] = {0, 0, 0, 0};
+    gl.ClearTexImage(group.codes.id(), 0, recorded == 1 ? GL_RED : GL_RGBA, GL_FLOAT, codes);
+    if (needsCoverageTarget(format)) {
+        group.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, size.x, size.y, size.z);
+        gl.ClearTexImage(group.coverage.id(), 0, GL_RED, GL_FLOAT, zero);
+    }
+    samples.groups.push_back(std::move(group));
+}
+
+void RasterDevice::copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at) {
+    const GlFunctions& gl = context.functions();
+    const auto copy = [&](const GlTexture& from, const GlTexture& to) {
+        gl.CopyImageSubData(from.id(), GL_TEXTURE_3D, 0, 0, 0, 0, to.id(), GL_TEXTURE_3D, 0, at.x, at.y, at.z,
+                            size_.x, size_.y, size_.z);
+    };
+    copy(target_.codes, samples.groups[group].codes);
+    if (target_.coverage) copy(target_.coverage, samples.groups[group].coverage);
+    finishRegion(context);
+}
+
+RasterCounts RasterDevice::takeCounts() {
+    return std::exchange(counts_, {});
+}
+
+RasterDevice& sharedRasterDevice(GlPlatform platform) {
+    // Never destroyed, like the threads they draw on.
+    static std::mutex mutex;
+    static auto& devices = *new std::map<GlPlatform, std::unique_ptr<RasterDevice>>();
+    const std::lock_guard lock(mutex);
+    std::unique_ptr<RasterDevice>& device = devices[platform];
+    if (!device) device = std::make_unique<RasterDevice>(sharedGlThread(platform));
+    return *device;
+}
+
+}  // namespace tessera

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "gl/gl_program.h"
+#include "gl/gl_thread.h"
+#include "raster/device_samples.h"
+#include "raster/hard_elements.h"
+#include "raster/prepared_region.h"
+#include "resample/resampler.h"
+
+namespace tessera {
+
+/// What the device has measured and counted since RasterDevice::begin().
+struct RasterCounts {
+    double uploadMs = 0, renderMs = 0, readBackMs = 0;
+    std::int64_t fragments = 0, vertices = 0, uploadBytes = 0, readBackBytes = 0;
+};
+
+/// A rendered region: codes of `components` floats a point, pixel by pixel, row by row, layer by layer.
+struct RasterImage {
+    int components = 1;
+    std::vector<float> codes;
+    std::vector<std::uint8_t> coverage;  ///< of the normalised formats: 0, or 1 + a bit a channel not finite
+};
+
+/// Renders the slabs of one region after another into a layered target. All functions but the constructor run
+/// on the device's OpenGL thread; whoever renders holds `exclusive` from the first begin() to the last
+/// readBack().
+class RasterDevice {
+  public:
+    RasterDevice(GlThread& thread);
+
+    GlThread& thread() { return thread_; }
+    std::mutex exclusive;
+
+    /// Clears the target for a region and takes its records. The passes over a region follow one another.
+    void begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
+               std::size_t pass = 0);
+    /// Draws what a generator made. Each slice may be drawn by one call only.
+    void draw(GlContext& context, const SliceBatch& batch);
+    void draw(GlContext& context, const std::vector<DecidedPoint>& points);
+    RasterImage readBack(GlContext& context);
+    RasterCounts takeCounts();
+
+    /// Adds textures for a group of channels to samples whose box is set, without values yet.
+    void addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format);
+    /// Copies the region, rendered with layers along z, to its place in a group.
+    void copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at);
+
+    /// Renders layer by layer, as on devices that can't choose a layer in the vertex shader; for tests.
+    void forbidVertexShaderLayer() { isLayered_ = false; }
+
+  private:
+    enum class Stage { sprites, polygons, points, silhouettes, gouraud };
+    struct Variant {
+        Stage stage;
+        bool isThin;
+        int channels, levels;
+        auto operator<=>(const Variant&) const = default;
+    };
+    struct Target {
+        GlTexture codes, coverage, depth;
+        GlFramebuffer framebuffer;
+        Vec3i size{0};  ///< s, t, layers
+        GLenum format = 0;
+    };
+    /// A ring of persistently mapped buffers that grow: the processor fills one while the device reads
+    /// others.
+    struct Stream {
+        struct Slot {
+            GlBuffer buffer;
+            void* mapped = nullptr;
+            GlFence read;
+        };
+        std::array<Slot, 4> slots;
+        std::size_t next = 0, filled = 0;
+    };
+
+    const GlProgram& program(GlContext& context, const Variant& variant);
+    void prepareTarget(GlContext& context, const Vec3i& size);
+    void clear(GlContext& context);
+    void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
+    void drawPublished(GlContext& context, const PublishedList& list);
+    void makeAlphaTexture(GlContext& context);
+    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
+                        const std::function<void()>& draw);
+    /// Waits until the device has read what stood there.
+    GLuint upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count);
+    template <class T>
+    GLuint upload(GlContext& context, Stream& stream, const std::vector<T>& items) {
+        return upload(context, stream, items.data(), items.size() * sizeof(T));
+    }
+    /// Marks that the device has been given all its work on what was last uploaded.
+    void release(GlContext& context, Stream& stream);
+    /// Collects the queries and gives the records' buffers back.
+    void finishRegion(GlContext& context);
+
+    GlThread& thread_;
+    bool isLayered_;
+    bool countsFragments_;
+    std::map<Variant, GlProgram> programs_;
+    Target target_;
+    Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, published_, nodeCodes_, vertices_,
+        indices_;
+    GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
+    GlTexture alphaTexture_;
+    std::vector<std::array<GlQuery, 2>> timers_;
+    std::vector<GlQuery> fragmentCounters_;
+    std::size_t usedQueries_ = 0;
+    RasterCounts counts_;
+
+    // Of the present region.
+    SliceAxes axes_;
+    Vec3i size_{0};  ///< s, t, layers
+    int channels_ = 1;
+    SampleFormat format_ = SampleFormat::r32f;
+};
+
+/// The process's device on a platform, made when first asked for; lives until the process ends.
+/// @throws GlError when the platform is not available.
+RasterDevice& sharedRasterDevice(GlPlatform platform);
+
+}  // namespace tessera

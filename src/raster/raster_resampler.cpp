@@ -1,0 +1,470 @@
+#include "raster/raster_resampler.h"
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <future>
+#include <limits>
+#include <mutex>
+#include <optional>
+
+#include "base/error.h"
+#include "base/timer.h"
+#include "gl/gl_platform.h"
+#include "index_space/element_bins.h"
+#include "raster/device_samples.h"
+#include "raster/hard_elements.h"
+#include "raster/raster_device.h"
+#include "raster/regions.h"
+#include "resample/bound_mesh.h"
+#include "resample/check_lattice.h"
+
+namespace tessera {
+
+namespace {
+
+/// What a region may take on the device.
+constexpr std::int64_t kTargetBytes = std::int64_t(160) << 20;
+/// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
+constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
+
+/// A wanted box being put together from its regions.
+struct OpenBlock {
+    Block block;
+    int partsLeft = 0;
+};
+
+/// A region on its way through the device.
+struct RegionJob {
+    const RasterRegion* region = nullptr;
+    PreparedRegion prepared;  ///< kept until the device is done
+    /// Kept for the passes after the first, when there are any.
+    std::vector<std::shared_ptr<const SliceBatch>> batches;
+    std::vector<std::future<void>> draws;
+    std::vector<std::future<RasterImage>> images;
+};
+
+class BoundRaster : public BoundRasterResampler {
+  public:
+    BoundRaster(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
+                GlPlatform platform, const SliceGenerator& generator, bool isPublished)
+        : mesh_(mesh, fields, routed(options, isPublished)),
+          format_(options.format),
+          isPublished_(isPublished),
+          platform_(platform),
+          target_(nameOf(platform)),
+          generator_(generator) {
+        if (mesh.elementCount() >= std::int64_t(1) << 30)
+            throw InputError("a mesh may have at most 2^30 - 1 elements");
+        for (const int f : fields) {
+            const Field& field = mesh.fields[std::size_t(f)];
+            for (int c = 0; c < field.components; ++c) channels_.emplace_back(field, c, format_);
+        }
+    }
+
+    std::string_view target() const override { return target_; }
+
+    ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                const BlockSink& sink, const Execution& execution) override {
+        checkLattice(lattice, boxes);
+        RasterDevice& device = sharedRasterDevice(platform_);
+        const std::lock_guard lock(device.exclusive);
+        return Run(*this, device, lattice, boxes, sink, execution).all();
+    }
+
+    std::shared_ptr<const DeviceSamples> resampleOnDevice(const Lattice& lattice, const IndexBox& box,
+                                                          const Execution& execution) override {
+        checkLattice(lattice, std::span(&box, 1));
+        RasterDevice& device = sharedRasterDevice(platform_);
+        const std::lock_guard lock(device.exclusive);
+        const std::shared_ptr<DeviceSamples> samples = makeDeviceSamples(device.thread());
+        samples->box = box;
+        samples->marks = sampleMarks(format_);
+        for (const ChannelCoding& coding : channels_)
+            samples->decodings.push_back({coding.scale(), coding.offset()});
+        const BlockSink nobody = [](std::size_t, const Block&) {};
+        Run(*this, device, lattice, std::span(&box, 1), nobody, execution, samples.get()).all();
+        return samples;
+    }
+
+  private:
+    /// One call of resample().
+    class Run {
+      public:
+        Run(const BoundRaster& bound, RasterDevice& device, const Lattice& lattice,
+            std::span<const IndexBox> boxes, const BlockSink& sink, const Execution& execution,
+            DeviceSamples* kept = nullptr)
+            : bound_(bound),
+              device_(device),
+              lattice_(lattice),
+              boxes_(boxes),
+              sink_(sink),
+              execution_(execution),
+              kept_(kept) {}
+
+        ResampleStatistics all();
+
+      private:
+        void plan();
+        void start(std::size_t region);
+        void generate(RegionJob& job, std::size_t pass);
+        void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch);
+        void finishOldest();
+        void copyPart(const RasterRegion& region, const RasterRegion::Part& part,
+                      const std::vector<RasterImage>& images);
+        void copyChannels(const RasterRegion& region, const RasterRegion::Part& part,
+                          const RasterImage& image, std::size_t pass, Block& block,
+                          std::int64_t& covered) const;
+        Block& open(std::size_t box);
+        void deliver(std::size_t box);
+        /// Frame and axes are set by plan().
+        RasterInputs inputs() const { return {mesh(), frame_, channels_, bound_.format_, axes_}; }
+        const TetMesh& mesh() const { return part_ ? *part_ : bound_.mesh_.whole(); }
+
+        const BoundRaster& bound_;
+        RasterDevice& device_;
+        const Lattice& lattice_;
+        std::span<const IndexBox> boxes_;
+        const BlockSink& sink_;
+        const Execution& execution_;
+        DeviceSamples* kept_;  ///< where samples stay on the device; the sink then gets nothing
+
+        std::optional<TetMesh> part_;          ///< what is near the boxes, where that is little
+        std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
+        NodeFrame frame_;
+        SliceAxes axes_;
+        std::vector<RasterRegion> regions_;
+        std::deque<RegionJob> jobs_;  ///< under way, oldest first; tasks refer to them
+        ElementBins bins_;
+        std::vector<std::unique_ptr<OpenBlock>> blocks_;
+        std::vector<int> partCounts_;
+        ResampleStatistics statistics_;
+        std::mutex mutex_;
+    };
+
+    /// The published methods' results depend on the slice axis, which goes by the whole mesh.
+    static BindOptions routed(BindOptions options, bool isPublished) {
+        if (isPublished) options.route = Route::pass;
+        return options;
+    }
+
+    BoundMesh mesh_;
+    SampleFormat format_;
+    bool isPublished_;
+    GlPlatform platform_;
+    std::string target_;
+    const SliceGenerator& generator_;
+    std::vector<ChannelCoding> channels_;
+};
+
+ResampleStatistics BoundRaster::Run::all() {
+    Timer timer;
+    part_ = bound_.mesh_.near(lattice_, boxes_, execution_);
+    channels_ = bound_.channels_;
+    if (part_) {
+        std::size_t c = 0;
+        for (const Field& field : part_->fields)
+            for (int k = 0; k < field.components; ++k, ++c) channels_[c] = channels_[c].on(field);
+    }
+    if (kept_)
+        device_.thread().run([&](GlContext& context) {
+            const RasterInputs all = inputs();
+            for (std::size_t pass = 0; pass < all.passCount(); ++pass)
+                device_.addGroup(context, *kept_, int(all.channelsOf(pass).size()), bound_.format_);
+        });
+    plan();
+    statistics_.addMs(stage::bin, timer.restart());
+    try {
+        for (std::size_t r = 0; r < regions_.size(); ++r) {
+            execution_.throwIfCancelled();
+            // The device draws one region while the processor prepares the next.
+            start(r);
+            if (jobs_.size() > 1) finishOldest();
+            execution_.report(Stage::sampling, std::int64_t(r) + 1, std::int64_t(regions_.size()));
+        }
+        while (!jobs_.empty()) finishOldest();
+    } catch (...) {
+        // What is queued refers to this call's data: let it pass. Its counts are nobody's.
+        device_.thread().run([&](GlContext& context) {
+            context.discardFailures();
+            device_.takeCounts();
+        });
+        throw;
+    }
+    const RasterCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
+    for (std::size_t b = 0; b < boxes_.size() && !kept_; ++b)
+        if (partCounts_[b] == 0) {
+            open(b);
+            deliver(b);
+        }
+    statistics_.addMs(stage::upload, counts.uploadMs);
+    statistics_.addMs(stage::render, counts.renderMs);
+    statistics_.addMs(stage::readBack, counts.readBackMs);
+    statistics_.add(counted::fragments, counts.fragments);
+    statistics_.add(counted::vertices, counts.vertices);
+    statistics_.add(counted::uploadBytes, counts.uploadBytes);
+    statistics_.add(counted::readBackBytes, counts.readBackBytes);
+    statistics_.addMs(stage::sample, timer.elapsedMs());
+    return statistics_;
+}
+
+void BoundRaster::Run::plan() {
+    const std::int64_t channels = std::min<std::int64_t>(4, std::int64_t(bound_.channels_.size()));
+    const std::int64_t bytesAPoint = channels > 1 ? 20 : 8;
+    regions_ = planRasterRegions(boxes_, kTargetBytes / bytesAPoint);
+    blocks_.resize(boxes_.size());
+    partCounts_.assign(boxes_.size(), 0);
+    std::vector<IndexBox> regionBoxes;
+    for (const RasterRegion& region : regions_) {
+        regionBoxes.push_back(region.points);
+        for (const RasterRegion::Part& part : region.parts) ++partCounts_[part.box];
+    }
+    frame_ = frameNodes(mesh(), lattice_, execution_);
+    axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
+    bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
+    statistics_.add(counted::elementsNear, mesh().elementCount());
+    statistics_.add(counted::coveredPoints, 0);
+    statistics_.add(counted::elementBlockPairs, std::int64_t(bins_.elements.size()));
+}
+
+void BoundRaster::Run::start(std::size_t region) {
+    RegionJob& job = jobs_.emplace_back();
+    job.region = &regions_[region];
+    const RasterInputs inputs = this->inputs();
+    const Timer timer;
+    const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
+    job.prepared = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
+    statistics_.addMs(stage::bin, timer.elapsedMs());
+    statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
+    statistics_.add(counted::elementSlicePairs, job.prepared.emptyPairs);
+    for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
+        job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
+            device_.begin(context, job.prepared, inputs, pass);
+        }));
+        generate(job, pass);
+        if (kept_)
+            job.draws.push_back(device_.thread().post([this, pass, at = region](GlContext& context) {
+                device_.copyTo(context, *kept_, pass, regions_[at].points.min - kept_->box.min);
+            }));
+        else
+            job.images.push_back(
+                device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
+    }
+    job.batches.clear();
+}
+
+void BoundRaster::Run::post(RegionJob& job, std::shared_ptr<const SliceBatch> batch) {
+    job.draws.push_back(device_.thread().post(
+        [this, batch = std::move(batch)](GlContext& context) { device_.draw(context, *batch); }));
+}
+
+void BoundRaster::Run::generate(RegionJob& job, std::size_t pass) {
+    const Timer timer;
+    const RasterInputs inputs = this->inputs();
+    const PreparedRegion& prepared = job.prepared;
+    // Primitives know nothing of channels, but those of the published methods hold values.
+    if (pass > 0 && !bound_.isPublished_) {
+        for (const auto& batch : job.batches) post(job, batch);
+    } else {
+        const Vec3i size = prepared.points.size();
+        const int layers = size[axes_.l];
+        constexpr int kLayersASlab = 8;
+        const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
+        parallelFor(execution_, std::int64_t(active.slabCount()), [&](std::int64_t i) {
+            const auto slab = std::size_t(i);
+            if (active.of(slab).empty()) return;
+            auto batch = std::make_shared<SliceBatch>();
+            const int first = int(i) * kLayersASlab;
+            SlabInput input{};
+            input.axes = axes_;
+            input.size = size;
+            input.layerBegin = first;
+            input.layerEnd = std::min(first + kLayersASlab, layers);
+            input.elements = prepared.elements;
+            input.active = active.of(slab);
+            if (bound_.isPublished_) {
+                input.published = prepared.published;
+                input.nodeCodes = prepared.nodeCodes[pass];
+                input.channels = inputs.recordedChannels(pass);
+                bound_.generator_.emitPublished(input, *batch);
+            } else {
+                bound_.generator_.emit(input, *batch);
+            }
+            const std::lock_guard guard(mutex_);
+            if (pass == 0) {
+                statistics_.add(counted::elementSlicePairs, batch->pairs);
+                statistics_.add(counted::polygons, batch->polygons);
+            }
+            if (inputs.passCount() > 1) job.batches.push_back(batch);
+            post(job, std::move(batch));
+        });
+    }
+    if (!prepared.hard.empty()) {
+        auto points = std::make_shared<std::vector<DecidedPoint>>(
+            decideHardElements(inputs, prepared, pass, execution_));
+        job.draws.push_back(
+            device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
+    }
+    statistics_.addMs(stage::generate, timer.elapsedMs());
+}
+
+void BoundRaster::Run::finishOldest() {
+    RegionJob& job = jobs_.front();
+    std::vector<RasterImage> images;
+    for (auto& draw : job.draws) draw.get();
+    for (auto& image : job.images) images.push_back(image.get());
+    job.prepared = {};
+    if (kept_) {
+        jobs_.pop_front();
+        return;
+    }
+    const auto& parts = job.region->parts;
+    parallelFor(execution_, std::int64_t(parts.size()),
+                [&](std::int64_t p) { copyPart(*job.region, parts[std::size_t(p)], images); });
+    jobs_.pop_front();
+}
+
+Block& BoundRaster::Run::open(std::size_t box) {
+    const std::lock_guard lock(mutex_);
+    std::unique_ptr<OpenBlock>& opened = blocks_[box];
+    if (!opened) {
+        opened = std::make_unique<OpenBlock>();
+        Block& block = opened->block;
+        block.lattice = lattice_;
+        block.box = boxes_[box];
+        block.channels = int(bound_.channels_.size());
+        block.values.assign(block.count() * bound_.channels_.size(), 0.0f);
+        block.coverage.assign(block.count(), 0);
+        opened->partsLeft = partCounts_[box];
+    }
+    return opened->block;
+}
+
+void BoundRaster::Run::deliver(std::size_t box) {
+    sink_(box, blocks_[box]->block);
+    blocks_[box].reset();
+}
+
+void BoundRaster::Run::copyPart(const RasterRegion& region, const RasterRegion::Part& part,
+                                const std::vector<RasterImage>& images) {
+    Block& block = open(part.box);
+    std::int64_t covered = 0;
+    for (std::size_t pass = 0; pass < images.size(); ++pass)
+        copyChannels(region, part, images[pass], pass, block, covered);
+    bool isWhole = false;
+    {
+        const std::lock_guard lock(mutex_);
+        statistics_.add(counted::coveredPoints, covered);
+        isWhole = --blocks_[part.box]->partsLeft == 0;
+    }
+    if (isWhole) deliver(part.box);
+}
+
+/// The usual case, without a branch a point: one channel, and coverage that the codes tell.
+std::int64_t copyRow(const float* codes, std::int64_t stride, int count, const ChannelCoding& coding,
+                     const SampleMarks& marks, float* values, std::uint8_t* coverage) {
+    int covered = 0;
+    for (int i = 0; i < count; ++i) {
+        const float code = codes[i * stride];
+        const bool isCovered = code != marks.uncovered;
+        const float value =
+            code >= marks.invalidFrom ? std::numeric_limits<float>::quiet_NaN() : coding.decode(code);
+        values[i] = isCovered ? value : 0.0f;
+        coverage[i] = isCovered;
+        covered += isCovered;
+    }
+    return covered;
+}
+
+void BoundRaster::Run::copyChannels(const RasterRegion& region, const RasterRegion::Part& part,
+                                    const RasterImage& image, std::size_t pass, Block& block,
+                                    std::int64_t& covered) const {
+    const RasterInputs inputs = this->inputs();
+    const std::span<const ChannelCoding> codings = inputs.channelsOf(pass);
+    const SampleMarks marks = sampleMarks(bound_.format_);
+    const Vec3i size = region.points.size();
+    std::int64_t stride[3];
+    stride[axes_.s] = 1;
+    stride[axes_.t] = size[axes_.s];
+    stride[axes_.l] = std::int64_t(size[axes_.s]) * size[axes_.t];
+    const bool hasCoverage = !image.coverage.empty();
+    Vec3i p = part.points.min;
+    for (p.z = part.points.min.z; p.z < part.points.max.z; ++p.z)
+        for (p.y = part.points.min.y; p.y < part.points.max.y; ++p.y) {
+            const Vec3i at = p - region.points.min;
+            const std::int64_t from = at.x * stride[0] + at.y * stride[1] + at.z * stride[2];
+            const std::size_t to = block.offset(p);
+            const int count = part.points.max.x - part.points.min.x;
+            if (codings.size() == 1 && pass == 0 && !hasCoverage) {
+                covered +=
+                    copyRow(image.codes.data() + from * image.components, stride[0] * image.components, count,
+                            codings[0], marks, block.values.data() + to, block.coverage.data() + to);
+                continue;
+            }
+            for (int i = 0; i < count; ++i) {
+                const auto pixel = std::size_t(from + i * stride[0]);
+                const float* codes = image.codes.data() + pixel * std::size_t(image.components);
+                const bool isCovered = hasCoverage ? image.coverage[pixel] != 0 : codes[0] != marks.uncovered;
+                if (!isCovered) continue;
+                block.coverage[to + std::size_t(i)] = 1;
+                covered += pass == 0;
+                for (std::size_t c = 0; c < codings.size(); ++c) {
+                    const bool isInvalid =
+                        hasCoverage ? ((image.coverage[pixel] - 1) >> c) & 1 : codes[c] >= marks.invalidFrom;
+                    block.values[(pass * kChannelsAPass + c) * block.count() + to + std::size_t(i)] =
+                        isInvalid ? std::numeric_limits<float>::quiet_NaN() : codings[c].decode(codes[c]);
+                }
+            }
+        }
+}
+
+}  // namespace
+
+RasterResampler::RasterResampler(std::string name, std::string description, Method method,
+                                 std::unique_ptr<const SliceGenerator> generator, double cost)
+    : Resampler({.name = std::move(name),
+                 .description = std::move(description),
+                 .isOnDevice = true,
+                 .targetsAgree = false,
+                 .meetsContract = method == Method::arithmetic,
+                 .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},
+                 .spillBoundVoxels = 0x1p-8,
+                 .placeBoundVoxels = 0x1p-8}),
+      method_(method),
+      generator_(std::move(generator)),
+      cost_(cost) {}
+
+std::string RasterResampler::unavailableReason() const {
+    if (!availableGlPlatforms().empty()) return {};
+    std::string reasons;
+    for (const GlPlatform platform : glPlatforms())
+        reasons += (reasons.empty() ? "" : "; ") + std::string(nameOf(platform)) + ": " +
+                   tessera::unavailableReason(platform);
+    return "there is no OpenGL 4.5 here (" + reasons + ")";
+}
+
+double RasterResampler::relativeCost() const {
+    return cost_ * (glDeviceInfo(chooseGlPlatform()).isSoftware ? kEmulatedCost : kDeviceCost);
+}
+
+std::vector<std::string> RasterResampler::targets() const {
+    std::vector<std::string> names;
+    for (const GlPlatform platform : availableGlPlatforms()) names.emplace_back(nameOf(platform));
+    return names;
+}
+
+std::unique_ptr<BoundResampler> RasterResampler::bind(const TetMesh& mesh, std::span<const int> fields,
+                                                      const BindOptions& options) const {
+    return bindToDevice(mesh, fields, options);
+}
+
+std::unique_ptr<BoundRasterResampler> RasterResampler::bindToDevice(const TetMesh& mesh,
+                                                                    std::span<const int> fields,
+                                                                    const BindOptions& options) const {
+    std::optional<GlPlatform> wanted;
+    if (!options.target.empty()) wanted = parseGlPlatform(options.target);
+    return std::make_unique<BoundRaster>(mesh, fields, options, chooseGlPlatform(wanted), *generator_,
+                                         method_ == Method::published);
+}
+
+}  // namespace tessera

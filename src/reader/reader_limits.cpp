@@ -1,0 +1,97 @@
+#include "reader/reader_limits.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "files/input_file.h"
+#include "mesh_files/ensight_check.h"
+#include "mesh_files/legacy_check.h"
+#include "mesh_files/xml_check.h"
+#include "reader/isolated_reader.h"
+
+namespace tessera {
+
+namespace {
+
+// Measured: reading a mesh of tetrahedra takes 10 to 20 bytes for each of a compressed file, and 190 an
+// element; a grid's point becomes five or six elements. The factors leave room for meshes that compress
+// better.
+constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytesPerItem = 700;
+constexpr double kFloorSeconds = 3, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
+// Others may have the processors, and disks may be slow.
+constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
+// Below, a file's own word on its cells is worth nothing: its size alone bounds what it may take.
+constexpr std::int64_t kSmallFile = 8 << 20;
+constexpr int kMostFiles = 100000;
+constexpr std::size_t kHeadBytes = 4096;
+
+struct InputSize {
+    double bytes = 0;
+    double items = 0;  ///< cells, or points of a structured grid
+};
+
+std::int64_t sizeOf(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(path, error);
+    return error ? 0 : std::int64_t(bytes);
+}
+
+/// Everything below the folder of a marker file.
+double bytesOfFolder(const std::filesystem::path& folder) {
+    using Iterator = std::filesystem::recursive_directory_iterator;
+    double bytes = 0;
+    int files = 0;
+    std::error_code error;
+    for (Iterator entry(folder.empty() ? "." : folder, error), end;
+         !error && entry != end && files < kMostFiles; entry.increment(error), ++files)
+        bytes += double(sizeOf(entry->path()));
+    return bytes;
+}
+
+InputSize sizeOfInput(const std::string& path) {
+    const std::filesystem::path given(path);
+    std::string extension = given.extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
+    if (extension == ".foam" && std::filesystem::exists(given))
+        return {bytesOfFolder(given.parent_path()), 0};
+    InputFile file(path);
+    const std::string head = file.copy(0, kHeadBytes);
+    const bool isLegacy = head.starts_with("# vtk DataFile");
+    if (isLegacy || head.find("<VTKFile") != std::string::npos) {
+        const DeclaredSize size = isLegacy ? checkLegacyFile(path) : checkXmlFile(path);
+        const std::int64_t cells = size.fileBytes > kSmallFile ? size.cellsOfAll : 0;
+        return {double(size.fileBytes), double(std::max(cells, size.gridPoints))};
+    }
+    if (extension == ".case" || extension == ".encas") return {double(checkEnSightCase(path).bytes), 0};
+    if (extension == ".node" || extension == ".ele")
+        return {double(sizeOf(std::filesystem::path(given).replace_extension(".node")) +
+                       sizeOf(std::filesystem::path(given).replace_extension(".ele"))),
+                0};
+    return {double(file.size()), 0};
+}
+
+}  // namespace
+
+IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts) {
+    InputSize size = sizeOfInput(path);
+    for (const std::string& part : otherParts) {
+        const InputSize more = sizeOfInput(part);
+        size.bytes += more.bytes;
+        size.items += more.items;
+    }
+    IsolationLimits limits;
+    double bytes = kFloorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items);
+    const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
+    if (pages > 0 && pageBytes > 0) bytes = std::min(bytes, 0.75 * double(pages) * double(pageBytes));
+    limits.memoryBytes = std::int64_t(bytes);
+    limits.processorSeconds =
+        kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
+    limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
+    return limits;
+}
+
+}  // namespace tessera

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace tessera {
+
+/// Bounds on the reading process. 0 means one from the size of the file, see defaultLimits.
+struct IsolationLimits {
+    /// Address space beyond what the program takes when it starts, its threads included: it reads on fewer
+    /// where their stacks would take more than an eighth.
+    std::int64_t memoryBytes = 0;
+    double seconds = 0;           ///< from its start to its last byte
+    double processorSeconds = 0;  ///< of all its threads together; no bound where only `seconds` is given
+};
+
+/// Bounds for a mesh of this size on disk, its other parts and companion files included, each once: 640 MiB
+/// and 96 bytes a byte of file, at most three quarters of the memory here; 3 s of processor time and a second
+/// for every 4 MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells
+/// in fewer bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK
+/// file declares. Throws InputError when the file is missing, empty or damaged at first sight.
+IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts = {});
+
+}  // namespace tessera

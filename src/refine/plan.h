@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/execution.h"
+#include "brick/brick_tree.h"
+#include "mesh/tet_mesh.h"
+#include "refine/refine_options.h"
+
+namespace tessera {
+
+/// What a plan would cost, before sampling.
+struct PlanEstimate {
+    std::int64_t storedPoints = 0;  ///< leaves x B^3
+    std::vector<std::int64_t> bricksPerLevel;
+    std::int64_t levelsBytes = 0;  ///< samples of all chosen fields, --layout levels
+    std::int64_t flatPoints = 0;   ///< points of the same volume at the finest spacing
+    std::int64_t flatBytes = 0;
+};
+
+/// The chosen leaf bricks. Throws InputError when the smallest sensible plan exceeds maxVoxels or
+/// maxMemoryBytes (the message says what would fit). For Criterion::uniform and elementSize; error-driven
+/// refinement samples as it goes, see refineAndResample.
+/// @param channels components of all fields that will be sampled: what a point costs.
+/// @param notes when not null, receives sentences for the user (a plan coarsened to keep a default bound).
+BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,
+                     int channels = 1, std::vector<std::string>* notes = nullptr);
+
+PlanEstimate estimatePlan(const BrickTree& tree, int channels);
+
+}  // namespace tessera

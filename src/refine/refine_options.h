@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/vec.h"
+#include "resample/resampler.h"
+
+namespace tessera {
+
+enum class Criterion { uniform, elementSize, error };
+enum class ErrorMeasure { max, rms };
+
+/// A frame that the plan must use: the lattice of another file, or of the first step of a time series.
+struct FixedFrame {
+    Vec3d originWorld{0};
+    double spacingWorld = 1;  ///< h_0
+};
+
+struct RefineOptions {
+    Criterion criterion = Criterion::elementSize;
+    int brickCells = 16;  ///< 8, 16, 32 or 64
+    int resolution = 0;   ///< lattice points along the longest axis of the bounds (the finest level); 0: not
+                          ///< given. They run exactly from the bounds' minimum to their maximum
+    double spacingWorld = 0;       ///< finest spacing; 0: not given
+    double samplesPerElement = 2;  ///< element-size: lattice points along a typical element edge
+    int maxLevels = 0;    ///< number of nested levels at most; 0: 8 for element-size, no bound for error
+    double maxError = 0;  ///< error: bound, in field units or as a share of each field's range
+    bool maxErrorIsRelative = true;
+    ErrorMeasure measure = ErrorMeasure::max;
+    std::vector<int>
+        errorFields;  ///< indices into mesh.fields that the bound holds for; empty: all point fields chosen
+    std::int64_t maxVoxels =
+        0;  ///< bound on stored points (leaves x B^3); 0: a default from the memory there is
+    std::int64_t maxMemoryBytes = 0;   ///< bound on the samples' memory; 0: no bound of its own
+    std::optional<Box3d> boundsWorld;  ///< keep only the points that reading inside this box needs
+    std::optional<FixedFrame> frame;   ///< instead of resolution and spacing; level 0 is then its spacing,
+                                       ///< even when no brick is so fine
+    BindOptions bind;                  ///< what the resampler runs with
+};
+
+}  // namespace tessera

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/execution.h"
+#include "mesh/tet_mesh.h"
+#include "refine/brick_result.h"
+#include "refine/refine.h"
+#include "resample/resampler.h"
+#include "vdb/vdb_file.h"
+
+namespace tessera {
+
+/// What a file is to hold of some samples.
+struct OutputShape {
+    VdbLayout layout = VdbLayout::levels;
+    int layers = 0;          ///< of the extension outside the mesh
+    bool halfFloat = false;  ///< round values to half floats where those can hold a grid
+    std::optional<Box3d> boundsWorld;
+    std::int64_t maxFlatVoxels =
+        0;  ///< flat: bound on points; 0: 2^26, or none when the bricks have one level
+    std::int64_t maxFlatBytes = 0;  ///< flat: bound on the grids' memory; 0: a quarter of the machine's
+};
+
+/// The grid that the flat layout makes of some bricks.
+struct FlatGridPlan {
+    int level = 0;            ///< the finest one within the bounds of OutputShape
+    bool isCapped = false;    ///< the finest bricks are finer
+    std::int64_t points = 0;  ///< of all bricks at that level's spacing
+    std::int64_t bytes = 0;   ///< values of all channels, and the coverage
+    std::string note;         ///< when it is capped, a sentence that says so and why
+};
+FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const OutputShape& shape);
+
+/// Makes of a run's samples what the file will hold: one grid for the flat layout, the extension, rounded
+/// values. Then measures that, so that the report is the file's; `samplesReport` keeps the samples' own when
+/// the file is coarser or less precise.
+/// @param outputs one for every field: the grids' names. @param resampler what the samples were made by.
+void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::vector<OutputField>& outputs,
+                  const Resampler& resampler, const BindOptions& bind, const OutputShape& shape,
+                  BrickResult& result, const Execution& execution);
+
+}  // namespace tessera

@@ -1,0 +1,448 @@
+#include "vdb/vdb_read.h"
+
+#include <openvdb/io/File.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <new>
+#include <string_view>
+#include <unordered_set>
+#include <utility>
+
+#include "base/error.h"
+#include "files/file_digest.h"
+#include "refine/refine_options.h"
+#include "vdb/openvdb_grids.h"
+#include "vdb/vdb_metadata.h"
+
+namespace tessera {
+namespace {
+
+constexpr std::size_t kUuidOffset = 21;
+constexpr std::size_t kUuidBytes = 36;
+constexpr std::size_t kHeaderBytes = kUuidOffset + kUuidBytes;
+constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
+
+[[noreturn]] void refuse(const std::string& path, const std::string& why) {
+    throw InputError(path + ": " + why);
+}
+
+// Whether the bytes are those that a Tessera wrote. Throws when they claim to be but aren't.
+bool checkBytes(const std::string& path) {
+    std::ifstream stream(path, std::ios::binary);
+    if (!stream) refuse(path, std::string("can't open it: ") + std::strerror(errno));
+    std::vector<char> bytes(std::size_t(1) << 20);
+    stream.read(bytes.data(), std::streamsize(bytes.size()));
+    std::size_t got = std::size_t(stream.gcount());
+    if (got == 0) refuse(path, "the file is empty, or not a file");
+    if (std::string_view(bytes.data(), got).starts_with("NanoVDB"))
+        refuse(path, "is a NanoVDB file; tessera reads .vdb files");
+    if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
+        refuse(path, "not a VDB file");
+    const std::string uuid(bytes.data() + kUuidOffset, kUuidBytes);
+    if (!isDigestUuid(uuid)) return false;
+    std::memset(bytes.data() + kUuidOffset, '0', kUuidBytes);
+    FileDigest digest;
+    while (got > 0) {
+        digest.update(bytes.data(), got);
+        stream.read(bytes.data(), std::streamsize(bytes.size()));
+        got = std::size_t(stream.gcount());
+    }
+    if (digest.uuid() != uuid)
+        refuse(path, "the file is damaged or incomplete: its bytes don't match its digest");
+    return true;
+}
+
+// Address space in use now, in bytes.
+[[maybe_unused]] std::uint64_t addressSpaceBytes() {
+    std::ifstream status("/proc/self/statm");
+    std::uint64_t pages = 0;
+    status >> pages;
+    return pages * std::uint64_t(::sysconf(_SC_PAGESIZE));
+}
+
+// What a read may take at most, for a file of this size: more means that a damaged length is believed.
+void limitReader(std::uint64_t fileBytes) {
+    const rlimit noCore{0, 0};
+    ::setrlimit(RLIMIT_CORE, &noCore);
+    const rlim_t seconds = 10 + rlim_t(fileBytes >> 20);
+    const rlimit cpu{seconds, seconds};
+    ::setrlimit(RLIMIT_CPU, &cpu);
+#ifndef __SANITIZE_ADDRESS__  // it reserves terabytes itself
+    const rlim_t bytes = rlim_t(addressSpaceBytes() + (std::uint64_t(256) << 20) + 64 * fileBytes);
+    const rlimit memory{bytes, bytes};
+    ::setrlimit(RLIMIT_AS, &memory);
+#endif
+    for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) ::signal(signal, SIG_DFL);
+}
+
+// OpenVDB trusts what it reads, so a damaged file can end the process or fill the memory. A file that no
+// digest vouches for is read in a child first, which may die.
+template <class Read>
+void tryInChild(const std::string& path, const Read& read) {
+    const std::uint64_t fileBytes = std::filesystem::file_size(path);
+    const pid_t child = ::fork();
+    if (child < 0)
+        throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
+    if (child == 0) {
+        limitReader(fileBytes);
+        // These exceptions the parent gets again when it reads, and tells better.
+        try {
+            read();
+        } catch (const openvdb::Exception&) {
+        } catch (const InputError&) {
+        } catch (...) {
+            ::_exit(1);
+        }
+        ::_exit(0);
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+    refuse(path, "the file is damaged: " +
+                     (WIFEXITED(status)
+                          ? std::string("a length in it is impossible")
+                          : "OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it"));
+}
+
+template <class Read>
+auto guarded(const std::string& path, const Read& read) {
+    try {
+        if (!checkBytes(path)) tryInChild(path, read);
+        return read();
+    } catch (const openvdb::Exception& error) {
+        refuse(path, std::string("OpenVDB can't read it: ") + error.what());
+    } catch (const InputError&) {
+        throw;
+    } catch (const IoError&) {
+        throw;
+    } catch (const InternalError&) {
+        throw;
+    } catch (const std::exception& error) {
+        refuse(path, std::string("the file is damaged: ") + error.what());
+    }
+}
+
+std::map<std::string, std::string> textEntries(const openvdb::MetaMap& metadata) {
+    std::map<std::string, std::string> entries;
+    for (auto it = metadata.beginMeta(); it != metadata.endMeta(); ++it) {
+        if (it->second && it->second->typeName() == openvdb::StringMetadata::staticTypeName())
+            entries[it->first] = it->second->str();
+    }
+    return entries;
+}
+
+template <class Grid>
+typename Grid::Ptr readTypedGrid(openvdb::io::File& file, const std::string& name) {
+    if (!file.hasGrid(name)) throw InputError("there is no grid " + name);
+    const typename Grid::Ptr grid = openvdb::gridPtrCast<Grid>(file.readGrid(name));
+    if (!grid)
+        throw InputError("grid " + name + " holds other values than its name and the file's description say");
+    return grid;
+}
+
+// Calls visit(leaf, tile position in the leaf, lattice index of its first point) for every tile of one level.
+template <class Visit>
+void forEachTilePlace(const BrickTree& tree, int tilesPerEdge, int level, const Visit& visit) {
+    for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+        const BrickKey& key = tree.leaves()[leaf];
+        if (key.level != level) continue;
+        const Vec3i first = tree.ownedPoints(key).min;
+        int tile = 0;
+        for (int x = 0; x < tilesPerEdge; ++x)
+            for (int y = 0; y < tilesPerEdge; ++y)
+                for (int z = 0; z < tilesPerEdge; ++z, ++tile)
+                    visit(leaf, tile, first + Vec3i(x, y, z) * kTileSize);
+    }
+}
+
+openvdb::Coord pointOf(const Vec3i& origin, int offset) {
+    return {origin.x + (offset >> 6), origin.y + (offset >> 3 & 7), origin.z + (offset & 7)};
+}
+
+using Words = std::array<std::uint64_t, 8>;
+
+template <class Node>
+Words activeWords(const Node& node) {
+    Words words;
+    for (openvdb::Index w = 0; w < 8; ++w)
+        words[w] = node.getValueMask().template getWord<openvdb::Index64>(w);
+    return words;
+}
+
+// The active points among 8^3.
+template <class Accessor>
+Words activeWords(Accessor& accessor, const Vec3i& origin) {
+    const openvdb::Coord first = pointOf(origin, 0);
+    if (const auto* node = accessor.probeConstLeaf(first)) return activeWords(*node);
+    Words words{};
+    // Another program merged the leaf node into a tile of its parent.
+    if (accessor.isValueOn(first)) words.fill(~std::uint64_t(0));
+    return words;
+}
+
+void readCoverage(const openvdb::BoolGrid& grid, int level, VdbFile& file) {
+    openvdb::BoolGrid::ConstAccessor accessor = grid.getConstAccessor();
+    std::uint64_t found = 0;
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level,
+                     [&](std::size_t leaf, int tile, const Vec3i& origin) {
+                         const Words words = activeWords(accessor, origin);
+                         std::uint64_t count = 0;
+                         for (std::uint64_t word : words) count += std::uint64_t(std::popcount(word));
+                         if (count > 0) file.store.ensureTile(leaf, tile).coverage = words;
+                         found += count;
+                     });
+    if (found != grid.activeVoxelCount())
+        throw InputError("grid " + grid.getName() + " covers points outside the bricks of its level");
+}
+
+template <class Grid, class Put>
+void readValues(const Grid& grid, int level, VdbFile& file, const Put& put) {
+    typename Grid::ConstAccessor accessor = grid.getConstAccessor();
+    forEachTilePlace(file.tree, file.store.tilesPerEdge(), level,
+                     [&](std::size_t leaf, int tile, const Vec3i& origin) {
+                         Tile* stored = file.store.tile(leaf, tile);
+                         if (!stored) return;
+                         for (int offset = 0; offset < kTilePoints; ++offset) {
+                             if (!stored->covered(offset)) continue;
+                             typename Grid::ValueType value;
+                             const bool valid = accessor.probeValue(pointOf(origin, offset), value);
+                             put(*stored, offset, valid, value);
+                         }
+                     });
+}
+
+// Active points of a value grid that lie outside the mesh, in the bricks and beside them.
+template <class Grid, class Put>
+void readExtension(const Grid& grid, int level, VdbFile& file, const Put& put) {
+    typename Grid::ConstAccessor accessor = grid.getConstAccessor();
+    const int n = file.store.tilesPerEdge();
+    constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
+    const std::size_t values = std::size_t(file.store.channels()) * kTilePoints;
+    const auto take = [&](const Vec3i& origin, Words words, const Tile* covered) {
+        for (std::size_t w = 0; covered && w < 8; ++w) words[w] &= ~covered->coverage[w];
+        if (words == Words{}) return;
+        Tile& tile = file.store.extension()[{level, floorDiv(origin, kTileSize)}];
+        if (!tile.values) {
+            tile.values = std::make_unique<float[]>(values);
+            std::fill_n(tile.values.get(), values, kInvalid);
+        }
+        for (int offset = 0; offset < kTilePoints; ++offset) {
+            if (!((words[std::size_t(offset >> 6)] >> (offset & 63)) & 1)) continue;
+            tile.cover(offset);
+            put(tile, offset, true, accessor.getValue(pointOf(origin, offset)));
+        }
+    };
+    forEachTilePlace(file.tree, n, level, [&](std::size_t leaf, int t, const Vec3i& origin) {
+        take(origin, activeWords(accessor, origin), file.store.tile(leaf, t));
+    });
+    for (auto node = grid.tree().cbeginLeaf(); node; ++node) {
+        const openvdb::Coord& o = node->origin();
+        const Vec3i origin(o.x(), o.y(), o.z());
+        if (file.tree.findLeaf({level, floorDiv(origin, file.tree.brickCells())}) < 0)
+            take(origin, activeWords(*node), nullptr);
+        for (auto off = node->cbeginValueOff(); off; ++off) file.strayValues += *off != grid.background();
+    }
+}
+
+// Notes a grid that stands elsewhere than the description says, or has another background.
+void checkFrame(const openvdb::GridBase& grid, int level, VdbFile& file) {
+    const double h = file.tree.spacingWorld(level) * file.unitScale;
+    const Vec3d origin = file.tree.originWorld() * file.unitScale + file.voxelShift * h;
+    const double far = std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)});
+    // Steps are differences of places, so they carry the rounding of the origin.
+    const double slack = 1e-9 * h + 1e-15 * (far + h);
+    const openvdb::Vec3d first = grid.transform().indexToWorld(openvdb::Vec3d(0.0));
+    bool fits = (first - turned(openvdb::Vec3d(origin.x, origin.y, origin.z), file.upAxis)).length() <= slack;
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d index(0.0);
+        index[axis] = 1;
+        const openvdb::Vec3d found = grid.transform().indexToWorld(index) - first;
+        fits = fits && (found - turned(index * h, file.upAxis)).length() <= slack;
+    }
+    if (!fits)
+        file.gridProblems.push_back("grid " + grid.getName() +
+                                    " stands elsewhere than the file's description says");
+}
+
+void checkBackground(double found, const openvdb::GridBase& grid, VdbFile& file) {
+    const double expected = double(file.background);
+    const double rounding = grid.saveFloatAsHalf() ? 0x1p-10 * std::abs(expected) + 0x1p-24 : 0;
+    if (!(std::abs(found - expected) <= rounding))
+        file.gridProblems.push_back("grid " + grid.getName() + " has another background than the file says");
+}
+
+void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
+    const auto coverage = readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", file.layout, level));
+    checkFrame(*coverage, level, file);
+    readCoverage(*coverage, level, file);
+    constexpr float kInvalid = std::numeric_limits<float>::quiet_NaN();
+    for (const GridPlan& plan : planGrids(file.fields)) {
+        const std::string name = gridName(plan.name, file.layout, level);
+        const auto at = [&](Tile& tile, int c, int offset) -> float& {
+            return tile.values[std::size_t(plan.firstChannel + c) * kTilePoints + std::size_t(offset)];
+        };
+        if (plan.components == 3) {
+            const auto grid = readTypedGrid<openvdb::Vec3SGrid>(source, name);
+            checkFrame(*grid, level, file);
+            for (int c = 0; c < 3; ++c) checkBackground(double(grid->background()[c]), *grid, file);
+            const auto put = [&](Tile& tile, int offset, bool valid, const openvdb::Vec3f& stored) {
+                const openvdb::Vec3f value = turnedBack(stored, file.upAxis);
+                for (int c = 0; c < 3; ++c) at(tile, c, offset) = valid ? value[c] : kInvalid;
+            };
+            readValues(*grid, level, file, put);
+            readExtension(*grid, level, file, put);
+        } else {
+            const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
+            checkFrame(*grid, level, file);
+            checkBackground(double(grid->background()), *grid, file);
+            const auto put = [&](Tile& tile, int offset, bool valid, float value) {
+                at(tile, 0, offset) = valid ? value : kInvalid;
+            };
+            readValues(*grid, level, file, put);
+            readExtension(*grid, level, file, put);
+        }
+    }
+}
+
+// Adds the bricks that hold an active point of a grid.
+template <class Grid>
+void listBricks(const Grid& grid, int brickCells, std::unordered_set<BrickKey, BrickKeyHash>& keys) {
+    const auto brickOf = [&](const openvdb::Coord& c) {
+        return floorDiv(Vec3i(c.x(), c.y(), c.z()), brickCells);
+    };
+    for (auto node = grid.tree().cbeginLeaf(); node; ++node)
+        if (!node->isEmpty()) keys.insert({0, brickOf(node->origin())});
+    auto tile = grid.cbeginValueOn();
+    tile.setMaxDepth(tile.getLeafDepth() - 1);
+    for (; tile; ++tile) {
+        const openvdb::CoordBBox box = tile.getBoundingBox();
+        if (box.dim().x() > 128)
+            throw InputError("grid " + grid.getName() + " has active tiles of " +
+                             std::to_string(box.dim().x()) +
+                             " voxels along an edge, which Tessera doesn't write");
+        const Vec3i low = brickOf(box.min()), high = brickOf(box.max());
+        for (int z = low.z; z <= high.z; ++z)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int x = low.x; x <= high.x; ++x) keys.insert({0, {x, y, z}});
+    }
+}
+
+// The grid of a flat file as bricks of one level.
+BrickTree flatTree(openvdb::io::File& source, const VdbFile& file) {
+    std::unordered_set<BrickKey, BrickKeyHash> keys;
+    const int b = file.tree.brickCells();
+    listBricks(*readTypedGrid<openvdb::BoolGrid>(source, "coverage"), b, keys);
+    for (const GridPlan& plan : planGrids(file.fields)) {
+        if (plan.components == 3)
+            listBricks(*readTypedGrid<openvdb::Vec3SGrid>(source, plan.name), b, keys);
+        else
+            listBricks(*readTypedGrid<openvdb::FloatGrid>(source, plan.name), b, keys);
+    }
+    return BrickTree(file.tree.originWorld(), file.tree.spacingWorld(file.flatLevel), b,
+                     {keys.begin(), keys.end()});
+}
+
+void listGrids(openvdb::io::File& source, VdbFile& file) {
+    const openvdb::GridPtrVecPtr grids = source.readAllGridMetadata();
+    for (const openvdb::GridBase::Ptr& grid : *grids) {
+        file.gridNames.push_back(grid->getName());
+        const auto count =
+            grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT);
+        file.gridVoxels.push_back(count ? count->value()
+                                        : std::int64_t(source.readGrid(grid->getName())->activeVoxelCount()));
+    }
+}
+
+VdbFile readWhole(const std::string& path) {
+    openvdb::io::File source(path);
+    source.open(/*delayLoad=*/false);
+    VdbFile file;
+    try {
+        file = decodeMetadata(textEntries(*source.getMetadata()));
+        listGrids(source, file);
+        if (file.layout == VdbLayout::flat) {
+            BrickTree grid = flatTree(source, file);
+            file.bricks = std::exchange(file.tree, std::move(grid));
+        }
+        int channels = 0;
+        for (const OutputField& field : file.fields) channels += field.components;
+        file.store = BrickStore(file.tree.brickCells(), file.tree.leafCount(), channels);
+        std::vector<bool> present(std::size_t(file.tree.levelCount()), false);
+        for (const BrickKey& key : file.tree.leaves()) present[std::size_t(key.level)] = true;
+        for (int level = 0; level < file.tree.levelCount(); ++level) {
+            if (present[std::size_t(level)]) readLevelGrids(source, level, file);
+        }
+    } catch (const InputError& error) {
+        refuse(path, error.what());
+    }
+    return file;
+}
+
+FixedFrame frameOfGrid(const std::string& path, const openvdb::GridBase& grid) {
+    const openvdb::math::Transform& transform = grid.transform();
+    const std::string name = "grid " + grid.getName();
+    if (!transform.isLinear()) refuse(path, name + " has a perspective transform, not a lattice of cubes");
+    const openvdb::Vec3d origin = transform.indexToWorld(openvdb::Vec3d(0, 0, 0));
+    openvdb::Mat3d steps;
+    for (int axis = 0; axis < 3; ++axis) {
+        openvdb::Vec3d unit(0, 0, 0);
+        unit[axis] = 1;
+        steps.setCol(axis, transform.indexToWorld(unit) - origin);
+    }
+    const double spacing = transform.voxelSize().x();
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            const double expected = row == column ? spacing : 0.0;
+            // The steps are differences of places, so they carry the rounding of the origin.
+            const double slack = 1e-9 * spacing + 4e-16 * (std::abs(origin[row]) + spacing);
+            if (!(std::abs(steps(row, column) - expected) <= slack))
+                refuse(
+                    path,
+                    name + " is turned or its voxels aren't cubes, so no lattice of bricks can be like it");
+        }
+    }
+    return {{origin.x(), origin.y(), origin.z()}, spacing};
+}
+
+FixedFrame readFrame(const std::string& path) {
+    openvdb::io::File source(path);
+    source.open(/*delayLoad=*/false);
+    const auto entries = textEntries(*source.getMetadata());
+    if (entries.count("tessera_format")) {
+        try {
+            const VdbMetadata metadata = decodeMetadata(entries);
+            return {metadata.tree.originWorld(), metadata.tree.spacingWorld(0)};
+        } catch (const InputError& error) {
+            refuse(path, error.what());
+        }
+    }
+    const openvdb::GridPtrVecPtr grids = source.readAllGridMetadata();
+    if (grids->empty()) refuse(path, "it holds no grid");
+    return frameOfGrid(path, *grids->front());
+}
+
+}  // namespace
+
+VdbFile readVdb(const std::string& path) {
+    openvdb::initialize();
+    return guarded(path, [&] { return readWhole(path); });
+}
+
+FixedFrame readVdbLattice(const std::string& path) {
+    openvdb::initialize();
+    return guarded(path, [&] { return readFrame(path); });
+}
+
+}  // namespace tessera

@@ -1,0 +1,18 @@
+if(TESSERA_BUILD_IO)
+  foreach(name vdb_file_test vdb_flat_test vdb_failure_test)
+    tessera_test(${name} LINK vdb PRIVATE_LINK tessera_openvdb)
+    if(TESSERA_SANITIZE MATCHES undefined)
+      set_source_files_properties(${name}.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=undefined)  # as in src/vdb
+    endif()
+  endforeach()
+  tessera_test(vdb_metadata_test LINK vdb)
+  tessera_test(nvdb_test LINK vdb PRIVATE_LINK tessera_nanovdb)
+  tessera_test(vti_test LINK vdb PRIVATE_LINK tessera_openvdb VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel VTK::IOXML)
+  # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
+  foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)
+    tessera_program(replay_${name} SOURCES fuzz/replay.cpp fuzz/${name}.cpp LINK reader vdb)
+    add_test(NAME replay_${name} COMMAND replay_${name} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${name})
+  endforeach()
+  tessera_test(image_test LINK pictures PRIVATE_LINK PNG::PNG)
+  tessera_test(image_exr_test LINK pictures registry reference PRIVATE_LINK PkgConfig::OPENEXR)
+endif()

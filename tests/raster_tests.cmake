@@ -1,0 +1,12 @@
+foreach(name plan shape generator)
+  tessera_test(raster_${name}_test OPTIMISED LINK reference registry)
+  list(APPEND raster_tests raster_${name}_test)
+endforeach()
+# Thread sanitizers have no place for the drivers of these.
+if(NOT TESSERA_SANITIZE MATCHES thread)
+  foreach(name run sceptic)
+    tessera_test(raster_${name}_test OPTIMISED LINK reference registry PRIVATE_LINK contract_suite)
+    list(APPEND raster_tests raster_${name}_test)
+  endforeach()
+endif()
+set_tests_properties(${raster_tests} PROPERTIES TIMEOUT 300)
