@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
 #include "raster/element_shape.h"
-#include "resample/resampler.h"
+#include "tessera/mesh.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

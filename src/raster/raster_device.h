@@ -14,7 +14,7 @@
 #include "raster/device_samples.h"
 #include "raster/hard_elements.h"
 #include "raster/prepared_region.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 
