@@ -44,6 +44,8 @@ struct BindOptions {
 /// for the call only.
 using BlockSink = std::function<void(std::size_t boxIndex, const Block& block)>;
 
+class DeviceSlots;
+
 /// A resampler with a mesh and a choice of fields. The mesh must outlive it and stay unchanged.
 class BoundResampler {
   public:
@@ -59,6 +61,12 @@ class BoundResampler {
     /// a box of more than 2^31 - 1 points.
     virtual ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
                                         const BlockSink& sink, const Execution& execution) = 0;
+
+    /// resample() into slots on a device, one a box. Algorithms on that device leave their samples there;
+    /// others, and those on another target, upload their blocks. Throws InputError besides where the slots
+    /// have other channels or, on their own target, another format.
+    virtual ResampleStatistics resampleToDevice(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                                DeviceSlots& slots, const Execution& execution);
 };
 
 /// What an algorithm is and can do.
