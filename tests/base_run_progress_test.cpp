@@ -25,7 +25,7 @@ struct TimedRun {
     }
 };
 
-TEST(RunProgress, passesThroughTheDeclaredShares) {
+TEST(RunProgress, PassesThroughTheDeclaredShares) {
     TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 2}, {Stage::writing, 1}});
     EXPECT_EQ(run.share(), 0);
@@ -37,7 +37,7 @@ TEST(RunProgress, passesThroughTheDeclaredShares) {
     EXPECT_NEAR(run.share(), 1, 1e-6);
 }
 
-TEST(RunProgress, aStageThatIsLeftOutGivesItsShareToTheOthers) {
+TEST(RunProgress, AStageThatIsLeftOutGivesItsShareToTheOthers) {
     TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::repairing, 5}, {Stage::writing, 1}});
     run.pass(Stage::reading, 10);
@@ -47,7 +47,7 @@ TEST(RunProgress, aStageThatIsLeftOutGivesItsShareToTheOthers) {
 }
 
 /// Whatever is expected of the rounds to come, the share never falls and ends at 1.
-TEST(RunProgress, neverGoesBackThroughRoundsThatWereExpectedWrongly) {
+TEST(RunProgress, NeverGoesBackThroughRoundsThatWereExpectedWrongly) {
     for (const double expected : {0.0, 3.0, 500.0}) {
         TimedRun run;
         run.progress.declare(kStages);
@@ -74,7 +74,7 @@ TEST(RunProgress, neverGoesBackThroughRoundsThatWereExpectedWrongly) {
     }
 }
 
-TEST(RunProgress, growsWithTimeWhileAStageReportsNothing) {
+TEST(RunProgress, GrowsWithTimeWhileAStageReportsNothing) {
     TimedRun run;
     run.progress.declare(kStages);
     run.progress.expect(Stage::reading, 1000);
@@ -88,7 +88,7 @@ TEST(RunProgress, growsWithTimeWhileAStageReportsNothing) {
     EXPECT_LT(last, 1.0 / 12);  // the stage's own share is the most
 }
 
-TEST(RunProgress, tellsTheTimeLeftByWhatOthersTook) {
+TEST(RunProgress, TellsTheTimeLeftByWhatOthersTook) {
     TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 2}, {Stage::writing, 1}});
     run.pass(Stage::reading, 60000);
@@ -102,7 +102,7 @@ TEST(RunProgress, tellsTheTimeLeftByWhatOthersTook) {
     EXPECT_NEAR(run.progress.state().leftMs, 2000, 1);
 }
 
-TEST(RunProgress, aSeriesIsOneRun) {
+TEST(RunProgress, ASeriesIsOneRun) {
     TimedRun run;
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 3}});
     double last = 0;
@@ -121,7 +121,7 @@ TEST(RunProgress, aSeriesIsOneRun) {
     EXPECT_NEAR(last, 1, 1e-6);
 }
 
-TEST(RunProgress, takesReportsOfManyThreads) {
+TEST(RunProgress, TakesReportsOfManyThreads) {
     TimedRun run;
     run.progress.declare({{Stage::sampling, 1}, {Stage::writing, 1}});
     std::atomic<std::int64_t> done{0};

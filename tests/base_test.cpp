@@ -17,7 +17,7 @@
 namespace tessera {
 namespace {
 
-TEST(ParallelFor, visitsEveryItemOnceForAnyThreadCount) {
+TEST(ParallelFor, VisitsEveryItemOnceForAnyThreadCount) {
     for (const int threads : {1, 2, 5, 16}) {
         Execution execution;
         execution.threads = threads;
@@ -27,7 +27,7 @@ TEST(ParallelFor, visitsEveryItemOnceForAnyThreadCount) {
     }
 }
 
-TEST(ParallelFor, rethrowsTheBodysException) {
+TEST(ParallelFor, RethrowsTheBodysException) {
     for (const int threads : {1, 4}) {
         Execution execution;
         execution.threads = threads;
@@ -39,7 +39,7 @@ TEST(ParallelFor, rethrowsTheBodysException) {
     }
 }
 
-TEST(ParallelFor, stopsWhenCancelled) {
+TEST(ParallelFor, StopsWhenCancelled) {
     for (const int threads : {1, 4}) {
         std::atomic<bool> cancel{false};
         std::atomic<int> done{0};
@@ -55,7 +55,7 @@ TEST(ParallelFor, stopsWhenCancelled) {
     }
 }
 
-TEST(ParallelFor, usesSeveralThreadsWhenAsked) {
+TEST(ParallelFor, UsesSeveralThreadsWhenAsked) {
     Execution execution;
     execution.threads = 4;
     std::mutex mutex;
@@ -71,7 +71,7 @@ TEST(ParallelFor, usesSeveralThreadsWhenAsked) {
     EXPECT_EQ(seen.size(), 2u);
 }
 
-TEST(ParallelForChunks, chunkBordersDoNotDependOnThreads) {
+TEST(ParallelForChunks, ChunkBordersDoNotDependOnThreads) {
     for (const int threads : {1, 3, 16}) {
         Execution execution;
         execution.threads = threads;
@@ -85,7 +85,7 @@ TEST(ParallelForChunks, chunkBordersDoNotDependOnThreads) {
     }
 }
 
-TEST(Check, namesTheConditionAndThePlace) {
+TEST(Check, NamesTheConditionAndThePlace) {
     try {
         TESSERA_CHECK(1 + 1 == 3, "arithmetic");
         FAIL();
@@ -95,14 +95,14 @@ TEST(Check, namesTheConditionAndThePlace) {
     }
 }
 
-TEST(FloorDiv, roundsTowardsMinusInfinity) {
+TEST(FloorDiv, RoundsTowardsMinusInfinity) {
     EXPECT_EQ(floorDiv(7, 4), 1);
     EXPECT_EQ(floorDiv(-1, 4), -1);
     EXPECT_EQ(floorDiv(-4, 4), -1);
     EXPECT_EQ(floorDiv(-5, 4), -2);
 }
 
-TEST(PeakMemory, growsWithWhatIsUsed) {
+TEST(PeakMemory, GrowsWithWhatIsUsed) {
     const long long before = peakMemoryBytes();
     std::vector<char> block(std::size_t(64) << 20, 1);
     EXPECT_GE(peakMemoryBytes() + block.back(), before + (32 << 20));

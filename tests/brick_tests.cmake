@@ -1,6 +1,7 @@
 tessera_test(brick_tree_test LINK brick)
 tessera_test(brick_growing_test OPTIMISED LINK brick)
 tessera_test(brick_store_test LINK refine)
+tessera_test(brick_plan_test OPTIMISED LINK refine reference)
 tessera_test(refine_test OPTIMISED LINK refine)
 tessera_test(seams_test OPTIMISED LINK refine)
 tessera_test(measure_error_test OPTIMISED LINK refine)

@@ -1,17 +1,21 @@
-#include "raster/device_samples.h"
+#include "device/device_samples.h"
+#include "resample/statistic_names.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "gl/gl_platform.h"
 #include "gl_test_tools.h"
 #include "hybrid/hybrid_resampler.h"
-#include "raster/raster_device.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 #include "slicing/slicing_resampler.h"
+#include "software/software_resampler.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {
@@ -21,58 +25,165 @@ TetMesh meshWithFields() {
     addPointField(mesh, "linear",
                   {[](const Vec3d& p) { return p.x - 2 * p.y; }, [](const Vec3d& p) { return p.z; }});
     addRandomField(mesh, "pressure", FieldLocation::point, 1, 101325, 1, 3);
+    addHoledCopy(mesh, 1, "holed", 50);
     addRandomField(mesh, "cells", FieldLocation::cell, 2, 0, 1, 4);
     return mesh;
 }
 
-class SamplesOnDevice : public testing::TestWithParam<SampleFormat> {};
+/// What stands in the slot of a box: the codes of a group and, where the format has it, its coverage.
+struct SlotContent {
+    std::vector<float> codes;
+    std::vector<std::uint8_t> coverage;
+};
+SlotContent readSlot(const TextureSlots& slots, std::size_t box, std::size_t group, const Vec3i& size) {
+    const std::size_t components = slots.channelsOf(group) <= 1 ? 1 : 4;
+    const auto count = std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z);
+    SlotContent content;
+    content.codes.resize(count * components);
+    content.coverage.resize(needsCoverageTexture(slots.format()) ? count : 0);
+    slots.thread().run([&](GlContext& context) {
+        const GlFunctions& gl = context.functions();
+        const SlotPlace place = slots.place(box, group);
+        const auto read = [&](const GlTexture& texture, GLenum format, GLenum type, auto& to) {
+            gl.GetTextureSubImage(texture.id(), 0, place.at.x, place.at.y, place.at.z, size.x, size.y, size.z,
+                                  format, type, GLsizei(to.size() * sizeof to[0]), to.data());
+        };
+        read(*place.codes, components == 1 ? GL_RED : GL_RGBA, GL_FLOAT, content.codes);
+        if (!content.coverage.empty()) read(*place.coverage, GL_RED, GL_UNSIGNED_BYTE, content.coverage);
+    });
+    return content;
+}
 
-TEST_P(SamplesOnDevice, AreThoseThatAreReadBack) {
-    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
-    const TetMesh mesh = meshWithFields();
-    std::vector<int> fields(mesh.fields.size());
-    std::iota(fields.begin(), fields.end(), 0);
-    const Lattice lattice = Lattice::axisParallel({0.3, 0.2, 0.1}, 1);
-    const IndexBox box{{-2, -1, -2}, {290, 14, 13}};
-    const BindOptions options{"egl-surfaceless", GetParam()};
-    const SlicingResampler slicing;
-    Block block;
-    slicing.bind(mesh, fields, options)
-        ->resample(lattice, std::span(&box, 1), [&](std::size_t, const Block& b) { block = b; }, {});
-    const auto bound = slicing.bindToDevice(mesh, fields, options);
-    const std::shared_ptr<const DeviceSamples> samples = bound->resampleOnDevice(lattice, box, {});
-    ASSERT_EQ(samples->groups.size(), 2u);
-    ASSERT_EQ(samples->decodings.size(), 5u);
-    std::int64_t covered = 0, wrong = 0;
-    std::size_t channel = 0;
-    for (const DeviceSamples::Group& group : samples->groups) {
-        const int components = group.channels == 1 ? 1 : 4;
-        std::vector<float> codes(block.count() * std::size_t(components));
-        std::vector<std::uint8_t> coverage(block.count());
-        sharedRasterDevice(GlPlatform::eglSurfaceless).thread().run([&](GlContext& context) {
-            const GlFunctions& gl = context.functions();
-            gl.GetTextureImage(group.codes.id(), 0, components == 1 ? GL_RED : GL_RGBA, GL_FLOAT,
-                               GLsizei(codes.size() * 4), codes.data());
-            if (group.coverage)
-                gl.GetTextureImage(group.coverage.id(), 0, GL_RED, GL_UNSIGNED_BYTE, GLsizei(coverage.size()),
-                                   coverage.data());
-        });
-        for (int c = 0; c < group.channels; ++c, ++channel) {
-            const DeviceSamples::Decoding& decoding = samples->decodings[channel];
-            for (std::size_t i = 0; i < block.count(); ++i) {
-                const float code = codes[i * std::size_t(components) + std::size_t(c)];
-                const bool isCovered = group.coverage ? coverage[i] != 0 : code != samples->marks.uncovered;
-                wrong += isCovered != (block.coverage[i] != 0);
-                if (!isCovered) continue;
-                ++covered;
-                const double value = decoding.scale * double(code) + decoding.offset;
-                const double expected = double(block.channel(int(channel))[i]);
-                wrong += !(std::abs(value - expected) <= 1e-6 * std::abs(expected) + 1e-12);
+/// Checks the slots of all boxes against blocks. @param step what a code may differ by; 0: bit for bit.
+void expectBlocks(const TextureSlots& slots, std::span<const Block> blocks, double step) {
+    const SampleMarks marks = sampleMarks(slots.format());
+    std::int64_t covered = 0, invalid = 0, wrong = 0;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+        const Block& block = blocks[b];
+        for (std::size_t group = 0; group < slots.groupCount(); ++group) {
+            const SlotContent content = readSlot(slots, b, group, block.box.size());
+            const std::size_t components = slots.channelsOf(group) <= 1 ? 1 : 4;
+            for (int c = 0; c < slots.channelsOf(group); ++c) {
+                const std::size_t channel = group * kChannelsAGroup + std::size_t(c);
+                const ValueCoding& coding = slots.codings()[channel];
+                for (std::size_t i = 0; i < block.count(); ++i) {
+                    const float code = content.codes[i * components + std::size_t(c)];
+                    const bool hasCoverage = !content.coverage.empty();
+                    const bool isCovered = hasCoverage ? content.coverage[i] != 0 : code != marks.uncovered;
+                    wrong += isCovered != (block.coverage[i] != 0);
+                    if (!isCovered || block.coverage[i] == 0) continue;
+                    ++covered;
+                    const float expected = block.channel(int(channel))[i];
+                    const bool isInvalid =
+                        hasCoverage ? ((content.coverage[i] - 1) >> c) & 1 : code >= marks.invalidFrom;
+                    invalid += isInvalid;
+                    wrong += isInvalid != std::isnan(expected);
+                    if (isInvalid || std::isnan(expected)) continue;
+                    if (step == 0)
+                        wrong += coding.decode(code) != expected;
+                    else
+                        wrong += !(std::abs(double(code) - coding.encode(double(expected))) <= step);
+                }
             }
         }
     }
     EXPECT_GT(covered, 100000);
+    EXPECT_GT(invalid, 100);
     EXPECT_EQ(wrong, 0);
+}
+
+/// One texture for all slots, as a pool has.
+class SharedTexture : public TextureSlots {
+  public:
+    SharedTexture(GlThread& thread, std::vector<ValueCoding> codings, const Vec3i& slotSize, int slots)
+        : TextureSlots(thread, std::move(codings), SampleFormat::r16), slotSize_(slotSize) {
+        thread.run([&](GlContext& context) {
+            for (std::size_t group = 0; group < groupCount(); ++group) {
+                codes_.emplace_back(context, GL_TEXTURE_3D, textureFormat(format(), channelsOf(group)),
+                                    slotSize.x, slotSize.y, slotSize.z * slots);
+                coverage_.emplace_back(context, GL_TEXTURE_3D, GL_R8, slotSize.x, slotSize.y,
+                                       slotSize.z * slots);
+            }
+        });
+    }
+    ~SharedTexture() override {
+        thread().run([&](GlContext&) { codes_.clear(), coverage_.clear(); });
+    }
+    SlotPlace place(std::size_t box, std::size_t group) const override {
+        return {&codes_[group], &coverage_[group], {0, 0, int(box) * slotSize_.z}};
+    }
+
+  private:
+    Vec3i slotSize_;
+    std::vector<GlTexture> codes_, coverage_;
+};
+
+class DeviceSlotsTest : public testing::Test {
+  protected:
+    DeviceSlotsTest() : mesh(meshWithFields()), fields(mesh.fields.size()) {
+        std::iota(fields.begin(), fields.end(), 0);
+    }
+    std::vector<Block> blocksBy(BoundResampler& bound) const {
+        std::vector<Block> blocks(boxes.size());
+        bound.resample(lattice, boxes, [&](std::size_t b, const Block& block) { blocks[b] = block; }, {});
+        return blocks;
+    }
+
+    TetMesh mesh;
+    std::vector<int> fields;
+    Lattice lattice = Lattice::axisParallel({0.3, 0.2, 0.1}, 1);
+    // Over several regions; beside one another; outside the mesh.
+    std::vector<IndexBox> boxes{{{-2, -1, -2}, {290, 14, 13}},
+                                {{5, 1, 1}, {22, 18, 18}},
+                                {{22, 1, 1}, {39, 18, 18}},
+                                {{400, 1, 1}, {417, 18, 18}}};
+};
+
+class SamplesOnDevice : public DeviceSlotsTest, public testing::WithParamInterface<SampleFormat> {};
+
+TEST_P(SamplesOnDevice, AreThoseThatAreReadBack) {
+    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
+    const auto bound = SlicingResampler().bind(mesh, fields, {"egl-surfaceless", GetParam()});
+    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+    const auto slots = DeviceSamples::make(thread, boxes, codingsOf(mesh, fields, GetParam()), GetParam());
+    ASSERT_EQ(slots->groupCount(), 2u);
+    const ResampleStatistics statistics = bound->resampleToDevice(lattice, boxes, *slots, {});
+    EXPECT_EQ(statistics.count(counted::readBackBytes), 0);
+    expectBlocks(*slots, blocksBy(*bound), 0);
+}
+
+TEST_P(SamplesOnDevice, AreUploadedByAlgorithmsOnTheProcessor) {
+    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
+    const auto bound = SoftwareResampler().bind(mesh, fields);
+    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+    const auto slots = DeviceSamples::make(thread, boxes, codingsOf(mesh, fields, GetParam()), GetParam());
+    bound->resampleToDevice(lattice, boxes, *slots, {});
+    // A driver may round to either side.
+    const double step = GetParam() == SampleFormat::r8    ? 1.0 / 255
+                        : GetParam() == SampleFormat::r16 ? 1.0 / 65535
+                                                          : 0x1p-11;
+    expectBlocks(*slots, blocksBy(*bound), GetParam() == SampleFormat::r32f ? 0 : step * 1.001);
+}
+
+TEST_F(DeviceSlotsTest, GoToTheirPlacesInOneTextureForAll) {
+    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
+    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+    SharedTexture pool(thread, codingsOf(mesh, fields, SampleFormat::r16), {292, 17, 17}, 4);
+    const auto bound = HybridResampler().bind(mesh, fields, {"egl-surfaceless", SampleFormat::r16});
+    bound->resampleToDevice(lattice, boxes, pool, {});
+    expectBlocks(pool, blocksBy(*bound), 0);
+}
+
+TEST_F(DeviceSlotsTest, WantSlotsOfTheirOwnKind) {
+    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
+    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+    const auto bound = SlicingResampler().bind(mesh, fields, {"egl-surfaceless", SampleFormat::r8});
+    const auto slots =
+        DeviceSamples::make(thread, boxes, codingsOf(mesh, fields, SampleFormat::r16), SampleFormat::r16);
+    EXPECT_THROW(bound->resampleToDevice(lattice, boxes, *slots, {}), InputError);
+    const auto fewer = DeviceSamples::make(thread, boxes, codingsOf(mesh, std::vector{0}, SampleFormat::r8),
+                                           SampleFormat::r8);
+    EXPECT_THROW(bound->resampleToDevice(lattice, boxes, *fewer, {}), InputError);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, SamplesOnDevice,

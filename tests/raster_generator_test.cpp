@@ -195,7 +195,7 @@ class GeneratorsOf : public testing::TestWithParam<Zoo> {};
 
 const Lattice kUnit = Lattice::axisParallel({0, 0, 0}, 1);
 
-TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsUpToAHundredVoxels) {
+TEST_P(GeneratorsOf, LoseNoCoveredPointOfElementsUpToAHundredVoxels) {
     Tally tally;
     std::uint64_t seed = 1000 * std::uint64_t(GetParam());
     for (const double size : {0.5, 2.0, 7.0, 24.0, 100.0})
@@ -214,7 +214,7 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsUpToAHundredVoxels) {
     EXPECT_GT(tally.polygons, 100);
 }
 
-TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsLongerThanCells) {
+TEST_P(GeneratorsOf, LoseNoCoveredPointOfElementsLongerThanCells) {
     Tally tally;
     std::uint64_t seed = 7000 + 1000 * std::uint64_t(GetParam());
     for (const double size : {300.0, 900.0, 1500.0, 6000.0}) {
@@ -227,7 +227,7 @@ TEST_P(GeneratorsOf, loseNoCoveredPointOfElementsLongerThanCells) {
     EXPECT_GT(tally.held, 50);
 }
 
-TEST_P(GeneratorsOf, loseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
+TEST_P(GeneratorsOf, LoseNoCoveredPointFarFromIndexZeroAndOnTurnedLattices) {
     Tally tally;
     const std::uint64_t seed = 17000 + 1000 * std::uint64_t(GetParam());
     const IndexBox near{{0, 0, 0}, {20, 20, 20}};

@@ -51,7 +51,7 @@ std::int64_t checkPlan(const std::vector<IndexBox>& boxes, std::int64_t maxPoint
     return rendered;
 }
 
-TEST(RasterRegions, oneBoxInACellIsOneRegion) {
+TEST(RasterRegions, OneBoxInACellIsOneRegion) {
     const std::vector<IndexBox> boxes{{{3, 4, 5}, {200, 250, 256}}};
     const auto regions = planRasterRegions(boxes, 1 << 24);
     ASSERT_EQ(regions.size(), 1u);
@@ -59,7 +59,7 @@ TEST(RasterRegions, oneBoxInACellIsOneRegion) {
     EXPECT_EQ(checkPlan(boxes, 1 << 24), boxes[0].count());
 }
 
-TEST(RasterRegions, emptyBoxesWantNothing) {
+TEST(RasterRegions, EmptyBoxesWantNothing) {
     EXPECT_TRUE(planRasterRegions({}, 1 << 24).empty());
     const std::vector<IndexBox> empty{
         {{0, 0, 0}, {0, 5, 5}}, {{3, 3, 3}, {2, 9, 9}}, {{-7, -7, -7}, {-7, -7, -7}}};
@@ -69,7 +69,7 @@ TEST(RasterRegions, emptyBoxesWantNothing) {
     EXPECT_EQ(checkPlan(mixed, 1 << 24), 1);
 }
 
-TEST(RasterRegions, noneCrossesACellAtNegativeAndHugeIndices) {
+TEST(RasterRegions, NoneCrossesACellAtNegativeAndHugeIndices) {
     const int far = 1'000'000'000;
     for (const int at : {-256, -255, -257, -1, 0, 255, 256, far, -far, (1 << 30) - 300, -(1 << 30)}) {
         const std::vector<IndexBox> boxes{{Vec3i(at), Vec3i(at + 1)},
@@ -80,13 +80,13 @@ TEST(RasterRegions, noneCrossesACellAtNegativeAndHugeIndices) {
     }
 }
 
-TEST(RasterRegions, keepTheirSizeDownToOnePoint) {
+TEST(RasterRegions, KeepTheirSizeDownToOnePoint) {
     const std::vector<IndexBox> boxes{{{-5, 0, 3}, {9, 8, 12}}, {{0, 0, 0}, {6, 6, 6}}};
     for (const std::int64_t most : {1, 2, 7, 64, 1000}) checkPlan(boxes, most);
     EXPECT_GE(checkPlan({{{0, 0, 0}, {300, 300, 300}}}, 1 << 20), 300 * 300 * 300);
 }
 
-TEST(RasterRegions, sparseBoxesWasteLittle) {
+TEST(RasterRegions, SparseBoxesWasteLittle) {
     // Two small boxes in opposite corners of a cell, a diagonal of bricks, a plane of bricks.
     std::vector<IndexBox> corners{{{0, 0, 0}, {9, 9, 9}}, {{247, 247, 247}, {256, 256, 256}}};
     EXPECT_EQ(checkPlan(corners, 1 << 24), 2 * 729);
@@ -102,7 +102,7 @@ TEST(RasterRegions, sparseBoxesWasteLittle) {
     }
 }
 
-TEST(RasterRegions, manyBricksShareRegions) {
+TEST(RasterRegions, ManyBricksShareRegions) {
     std::vector<IndexBox> bricks;
     for (int z = -128; z < 128; z += 16)
         for (int y = -128; y < 128; y += 16)
@@ -112,7 +112,7 @@ TEST(RasterRegions, manyBricksShareRegions) {
     EXPECT_EQ(checkPlan(bricks, 1 << 24), 257 * 257 * 257);
 }
 
-TEST(RasterRegions, randomBoxesAreCutExactly) {
+TEST(RasterRegions, RandomBoxesAreCutExactly) {
     Random random(5);
     for (int round = 0; round < 40; ++round) {
         std::vector<IndexBox> boxes;
@@ -137,7 +137,7 @@ std::uint32_t bitsOf(float value) {
     return std::bit_cast<std::uint32_t>(value);
 }
 
-TEST(ChannelCoding, r32fGivesFloatsBackBitForBit) {
+TEST(ChannelCoding, R32fGivesFloatsBackBitForBit) {
     constexpr double kMost = std::numeric_limits<float>::max();
     const std::vector<std::vector<double>> fields{{1, -2.5, 0.1f, 3e7, 0},
                                                   {kMost, -kMost, 1e38f, -1.0, 1e-3f},
@@ -158,7 +158,7 @@ TEST(ChannelCoding, r32fGivesFloatsBackBitForBit) {
     }
 }
 
-TEST(ChannelCoding, fieldsFarBelowFloatsHaveFiniteCodes) {
+TEST(ChannelCoding, FieldsFarBelowFloatsHaveFiniteCodes) {
     for (const double size : {1e-46, 1e-60, 1e-300, 5e-324}) {
         const Field field = fieldOf({size, -size, 0});
         const ChannelCoding coding(field, 0, SampleFormat::r32f);
@@ -170,7 +170,7 @@ TEST(ChannelCoding, fieldsFarBelowFloatsHaveFiniteCodes) {
     }
 }
 
-TEST(ChannelCoding, r32fGivesRandomFloatsOfSixtyBinadesBackBitForBit) {
+TEST(ChannelCoding, R32fGivesRandomFloatsOfSixtyBinadesBackBitForBit) {
     Random random(9);
     std::vector<double> values;
     for (int i = 0; i < 2000; ++i)
@@ -181,7 +181,7 @@ TEST(ChannelCoding, r32fGivesRandomFloatsOfSixtyBinadesBackBitForBit) {
         EXPECT_EQ(bitsOf(coding.decode(float(coding.encode(value)))), bitsOf(float(value)));
 }
 
-TEST(ChannelCoding, normalisedFormatsAreWithinHalfAStepAndTheFieldsRange) {
+TEST(ChannelCoding, NormalisedFormatsAreWithinHalfAStepAndTheFieldsRange) {
     struct Steps {
         SampleFormat format;
         double levels;
@@ -212,7 +212,7 @@ TEST(ChannelCoding, normalisedFormatsAreWithinHalfAStepAndTheFieldsRange) {
         }
 }
 
-TEST(ChannelCoding, aFieldOfOneValueOrOfNoneHasNoRange) {
+TEST(ChannelCoding, AFieldOfOneValueOrOfNoneHasNoRange) {
     for (const SampleFormat format :
          {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8}) {
         const Field constant = fieldOf({0.1, 0.1, std::nan("")});
@@ -225,7 +225,7 @@ TEST(ChannelCoding, aFieldOfOneValueOrOfNoneHasNoRange) {
     }
 }
 
-TEST(ChannelCoding, marksAreNoCodes) {
+TEST(ChannelCoding, MarksAreNoCodes) {
     for (const SampleFormat format : {SampleFormat::r32f, SampleFormat::r16f}) {
         const SampleMarks marks = sampleMarks(format);
         EXPECT_NE(marks.uncovered, marks.invalid);

@@ -35,7 +35,7 @@ class RasterRuns : public testing::TestWithParam<GlPlatform> {
     void SetUp() override { TESSERA_NEEDS_GL(GetParam()); }
 };
 
-TEST_P(RasterRuns, aThousandLeakNeitherObjectsNorMemory) {
+TEST_P(RasterRuns, AThousandLeakNeitherObjectsNorMemory) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> one{0}, all{0, 1, 2};
     const IndexBox box = centredBox(8);
@@ -57,7 +57,7 @@ TEST_P(RasterRuns, aThousandLeakNeitherObjectsNorMemory) {
 #endif
 }
 
-TEST_P(RasterRuns, aThousandBindingsLeakNothing) {
+TEST_P(RasterRuns, AThousandBindingsLeakNothing) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> all{0, 1, 2};
     std::int64_t objects = 0, bytes = 0;
@@ -70,7 +70,7 @@ TEST_P(RasterRuns, aThousandBindingsLeakNothing) {
     EXPECT_LT(residentBytes() - bytes, 8 << 20);
 }
 
-TEST_P(RasterRuns, severalThreadsUseOneBoundResampler) {
+TEST_P(RasterRuns, SeveralThreadsUseOneBoundResampler) {
     const TetMesh mesh = smallMesh();
     const std::vector<int> all{0, 1, 2};
     for (const std::string_view algorithm : kAlgorithms) {
@@ -119,11 +119,11 @@ void compareAtOnce(const std::vector<std::pair<std::string_view, GlPlatform>>& r
         EXPECT_EQ(threads[t].get(), 0) << runners[t].first << " on " << nameOf(runners[t].second);
 }
 
-TEST_P(RasterRuns, bothAlgorithmsRunAtOnceOnOneDevice) {
+TEST_P(RasterRuns, BothAlgorithmsRunAtOnceOnOneDevice) {
     compareAtOnce({{"slicing", GetParam()}, {"hybrid", GetParam()}, {"slicing", GetParam()}});
 }
 
-TEST(RasterRunsOnTwoPlatforms, giveTheSameBitsAsAlone) {
+TEST(RasterRunsOnTwoPlatforms, GiveTheSameBitsAsAlone) {
     TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
     TESSERA_NEEDS_GL(GlPlatform::osmesa);
     compareAtOnce({{"slicing", GlPlatform::eglSurfaceless},
@@ -168,7 +168,7 @@ std::shared_ptr<RasterDevice> makeDevice(GlPlatform platform) {
             [&thread](RasterDevice* device) { thread.run([device](GlContext&) { delete device; }); }};
 }
 
-TEST_P(RasterRuns, layerByLayerGivesTheSameBits) {
+TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
     TetMesh mesh = smallMesh(2);
     // Thin and hard elements too, inside and beside the others.
     TetMesh thin = thinTetsMesh(ThinKind::sliver, 1e-5, 0.7, 20, 3);
@@ -207,7 +207,7 @@ TEST_P(RasterRuns, layerByLayerGivesTheSameBits) {
             }
 }
 
-TEST_P(RasterRuns, aDrawThatFailsHalfWayLeavesTheDeviceUsable) {
+TEST_P(RasterRuns, ADrawThatFailsHalfWayLeavesTheDeviceUsable) {
     const TetMesh mesh = smallMesh(2);
     const NodeFrame frame = frameNodes(mesh, centredLattice(20), {});
     const ChannelCoding coding(mesh.fields[0], 0, SampleFormat::r32f);
@@ -264,7 +264,7 @@ class BrokenOff {
 
 const BlockSink kNobody = [](std::size_t, const Block&) {};
 
-TEST_P(RasterRuns, cancelledRunsLeaveTheDeviceUsable) {
+TEST_P(RasterRuns, CancelledRunsLeaveTheDeviceUsable) {
     for (const std::string_view algorithm : kAlgorithms) {
         const BrokenOff runs(algorithm, GetParam(),
                              algorithm == "slicing" ? SampleFormat::r16 : SampleFormat::r32f);
@@ -300,7 +300,7 @@ class CancellingProgress : public ProgressSink {
     int after_;
 };
 
-TEST_P(RasterRuns, maybeCancelledAtAnyMomentFromAnyThread) {
+TEST_P(RasterRuns, MaybeCancelledAtAnyMomentFromAnyThread) {
     const BrokenOff runs("hybrid", GetParam());
     for (const int after : {1, 2, 3, 6}) {
         std::atomic<bool> cancel{false};
@@ -328,7 +328,7 @@ TEST_P(RasterRuns, maybeCancelledAtAnyMomentFromAnyThread) {
     EXPECT_EQ(liveObjects(GetParam()), objects);
 }
 
-TEST_P(RasterRuns, whatTheSinkThrowsIsThrownAndTheDeviceStaysUsable) {
+TEST_P(RasterRuns, WhatTheSinkThrowsIsThrownAndTheDeviceStaysUsable) {
     for (const std::string_view algorithm : kAlgorithms) {
         const BrokenOff runs(algorithm, GetParam());
         for (const int threads : {1, 3})
@@ -352,7 +352,7 @@ void beginTooLarge(RasterDevice& device, GlContext& context) {
     device.begin(context, region, inputs);
 }
 
-TEST_P(RasterRuns, afterAnOpenGlErrorTheDeviceStaysUsable) {
+TEST_P(RasterRuns, AfterAnOpenGlErrorTheDeviceStaysUsable) {
     for (const std::string_view algorithm : kAlgorithms) {
         // One channel, as the region that fails has: its target would be taken for the run's.
         const BrokenOff runs(algorithm, GetParam(), SampleFormat::r32f, {0});

@@ -93,7 +93,7 @@ void expectContract(const contract::Subject& subject, const TetMesh& mesh, const
     EXPECT_GT(report.inMesh, 0);
 }
 
-TEST_P(RasterSceptic, emptyMeshesCoverNothing) {
+TEST_P(RasterSceptic, EmptyMeshesCoverNothing) {
     TetMesh empty, nodesOnly, flatOnly;
     nodesOnly.points = {{0, 0, 0}, {1, 2, 3}};
     flatOnly.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
@@ -111,7 +111,7 @@ TEST_P(RasterSceptic, emptyMeshesCoverNothing) {
     }
 }
 
-TEST_P(RasterSceptic, noBoxesAndEmptyBoxesAreServed) {
+TEST_P(RasterSceptic, NoBoxesAndEmptyBoxesAreServed) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> fields{0, 1};
     EXPECT_TRUE(sample(mesh, fields, centredLattice(8), {}).empty());
@@ -119,7 +119,7 @@ TEST_P(RasterSceptic, noBoxesAndEmptyBoxesAreServed) {
     for (const Block& block : sample(mesh, fields, centredLattice(8), empty)) EXPECT_EQ(block.count(), 0u);
 }
 
-TEST_P(RasterSceptic, withoutFieldsThereIsStillCoverage) {
+TEST_P(RasterSceptic, WithoutFieldsThereIsStillCoverage) {
     TetMesh mesh = smallMesh(2);
     mesh.fields.clear();
     for (const SampleFormat format :
@@ -128,7 +128,7 @@ TEST_P(RasterSceptic, withoutFieldsThereIsStillCoverage) {
                        {Vec3i(-1), Vec3i(14)});
 }
 
-TEST_P(RasterSceptic, fieldsOfNineComponentsAndSeventeenChannels) {
+TEST_P(RasterSceptic, FieldsOfNineComponentsAndSeventeenChannels) {
     TetMesh mesh = boxMesh({.cells = Vec3i(2), .jitter = 0.25});
     addRandomField(mesh, "tensor", FieldLocation::point, 9, 10, 5, 1);
     addRandomField(mesh, "cells", FieldLocation::cell, 7, 0, 1, 2);
@@ -141,7 +141,7 @@ TEST_P(RasterSceptic, fieldsOfNineComponentsAndSeventeenChannels) {
                        {Vec3i(0), Vec3i(11)});
 }
 
-TEST_P(RasterSceptic, aFieldAskedForTwiceComesTwice) {
+TEST_P(RasterSceptic, AFieldAskedForTwiceComesTwice) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> fields{1, 0, 0, 1};
     const IndexBox box = centredBox(9);
@@ -152,7 +152,7 @@ TEST_P(RasterSceptic, aFieldAskedForTwiceComesTwice) {
         EXPECT_TRUE(std::ranges::equal(block.channel(a), block.channel(b))) << a;
 }
 
-TEST_P(RasterSceptic, singlePointsAndRowsAreThoseOfTheWhole) {
+TEST_P(RasterSceptic, SinglePointsAndRowsAreThoseOfTheWhole) {
     const TetMesh mesh = smallMesh(3);
     const std::vector<int> fields{0, 1, 2};
     const Lattice lattice = centredLattice(20);
@@ -174,7 +174,7 @@ TEST_P(RasterSceptic, singlePointsAndRowsAreThoseOfTheWhole) {
     }
 }
 
-TEST_P(RasterSceptic, overlappingAndRepeatedBoxesAgree) {
+TEST_P(RasterSceptic, OverlappingAndRepeatedBoxesAgree) {
     const TetMesh mesh = smallMesh(3);
     const std::vector<int> fields{0};
     const Lattice lattice = centredLattice(30);
@@ -185,7 +185,7 @@ TEST_P(RasterSceptic, overlappingAndRepeatedBoxesAgree) {
     for (const Block& block : blocks) EXPECT_EQ(contract::differences(block, blocks[0]), 0);
 }
 
-TEST_P(RasterSceptic, aBoxOfThreeHundredPointsASideStraddlesCells) {
+TEST_P(RasterSceptic, ABoxOfThreeHundredPointsASideStraddlesCells) {
     TetMesh mesh = sphereMesh(7);
     addPointField(mesh, "linear", {[](const Vec3d& p) { return p.x + 2 * p.y - 3 * p.z; }});
     const std::vector<int> fields{0};
@@ -202,7 +202,7 @@ TEST_P(RasterSceptic, aBoxOfThreeHundredPointsASideStraddlesCells) {
     EXPECT_LT(worst, std::sqrt(14.0) / 140 * 0x1p-8);
 }
 
-TEST_P(RasterSceptic, indicesOfABillionMatter) {
+TEST_P(RasterSceptic, IndicesOfABillionMatter) {
     const TetMesh mesh = smallMesh(2);
     const int away = 1'000'000'000;
     for (const Vec3i& offset : {Vec3i(away), Vec3i(-away), Vec3i(away, -away, 7)}) {
@@ -236,7 +236,7 @@ std::vector<OddLattice> oddLattices() {
              {{-40, -40, 0}, {40, 40, 1}}}};
 }
 
-TEST_P(RasterSceptic, oddLatticesKeepTheContract) {
+TEST_P(RasterSceptic, OddLatticesKeepTheContract) {
     const TetMesh mesh = smallMesh(2);
     for (const OddLattice& odd : oddLattices()) {
         SCOPED_TRACE(odd.name);
@@ -244,7 +244,7 @@ TEST_P(RasterSceptic, oddLatticesKeepTheContract) {
     }
 }
 
-TEST_P(RasterSceptic, oddLatticesCoverWhatSoftwareCovers) {
+TEST_P(RasterSceptic, OddLatticesCoverWhatSoftwareCovers) {
     TetMesh mesh = gradedDelaunayMesh(300, 2.5, 4);
     addPointField(mesh, "wavy", {wavyField});
     const std::vector<int> fields{0};
@@ -256,7 +256,7 @@ TEST_P(RasterSceptic, oddLatticesCoverWhatSoftwareCovers) {
     }
 }
 
-TEST_P(RasterSceptic, tinyValuesBesideLargeOnesKeepTheContractInEveryChannel) {
+TEST_P(RasterSceptic, TinyValuesBesideLargeOnesKeepTheContractInEveryChannel) {
     // Channels of different groups must not disagree about who owns a point, though the tiny values of one
     // need the processor.
     TetMesh mesh = boxMesh({.cells = Vec3i(3), .jitter = 0.25});
@@ -271,7 +271,7 @@ TEST_P(RasterSceptic, tinyValuesBesideLargeOnesKeepTheContractInEveryChannel) {
                        {Vec3i(-1), Vec3i(14)});
 }
 
-TEST_P(RasterSceptic, pointsJustBesideTheMeshAreTheSameInEveryBox) {
+TEST_P(RasterSceptic, PointsJustBesideTheMeshAreTheSameInEveryBox) {
     // Where rounding may decide, it must decide alike: planes of the lattice lie a little outside of the
     // mesh, or inside, as with meshes whose coordinates were floats.
     for (const bool isTurned : {false, true}) {
@@ -296,14 +296,14 @@ TEST_P(RasterSceptic, pointsJustBesideTheMeshAreTheSameInEveryBox) {
     }
 }
 
-TEST_P(RasterSceptic, valuesFiftyDecadesApartInOneFieldKeepTheContract) {
+TEST_P(RasterSceptic, ValuesFiftyDecadesApartInOneFieldKeepTheContract) {
     TetMesh mesh = boxMesh({.cells = Vec3i(3), .jitter = 0.25});
     addPointField(mesh, "wide", {[](const Vec3d& p) { return p.x > 0.5 ? 3e38 : 1e-12 * (1 + p.y); }});
     addCellField(mesh, "wide cells", {[](const Vec3d& p) { return p.x > 0.5 ? -1e20 : 1e-30 * (1 + p.y); }});
     expectContract(subject(), mesh, Lattice::axisParallel(Vec3d(0), 1.0 / 12), {Vec3i(-1), Vec3i(14)});
 }
 
-TEST_P(RasterSceptic, valuesTooSmallForFloatsCostNothing) {
+TEST_P(RasterSceptic, ValuesTooSmallForFloatsCostNothing) {
     TetMesh mesh = boxMesh({.cells = Vec3i(3)});
     addPointField(mesh, "fraction", {[](const Vec3d& p) { return p.x > 0.9 ? 1.0 : 1e-60 * (1 + p.y); }});
     const std::vector<int> fields{0};
@@ -316,7 +316,7 @@ TEST_P(RasterSceptic, valuesTooSmallForFloatsCostNothing) {
     expectContract(subject(), mesh, centredLattice(12), box);
 }
 
-TEST_P(RasterSceptic, invertedOverlappingAndHangingElementsKeepTheContract) {
+TEST_P(RasterSceptic, InvertedOverlappingAndHangingElementsKeepTheContract) {
     TetMesh mesh = overlappingMesh(60, 3);
     appendMesh(mesh, hangingNodeMesh(2, 3));
     addFlatElements(mesh);
@@ -328,7 +328,7 @@ TEST_P(RasterSceptic, invertedOverlappingAndHangingElementsKeepTheContract) {
                        {Vec3i(-1), Vec3i(18)});
 }
 
-TEST_P(RasterSceptic, badRequestsAreRefusedAndForgotten) {
+TEST_P(RasterSceptic, BadRequestsAreRefusedAndForgotten) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> fields{0};
     BindOptions options;

@@ -78,7 +78,7 @@ const Lattice kUnit = Lattice::axisParallel({0, 0, 0}, 1);
 
 class ShapesOf : public testing::TestWithParam<Zoo> {};
 
-TEST_P(ShapesOf, acceptEveryContainedPointAndNoneBesideByMoreThanTheBound) {
+TEST_P(ShapesOf, AcceptEveryContainedPointAndNoneBesideByMoreThanTheBound) {
     Tally tally;
     std::uint64_t seed = 100'000 + 1000 * std::uint64_t(GetParam());
     for (const double size : {0x1p-12, 0.03, 0.5, 2.0, 7.0, 24.0, 100.0})
@@ -93,7 +93,7 @@ TEST_P(ShapesOf, acceptEveryContainedPointAndNoneBesideByMoreThanTheBound) {
     EXPECT_GT(tally.easy + tally.thin, 100);
 }
 
-TEST_P(ShapesOf, areRightInElementsLongerThanCells) {
+TEST_P(ShapesOf, AreRightInElementsLongerThanCells) {
     Tally tally;
     std::uint64_t seed = 107'000 + 1000 * std::uint64_t(GetParam());
     for (const double size : {300.0, 900.0, 2500.0, 20000.0})
@@ -105,7 +105,7 @@ TEST_P(ShapesOf, areRightInElementsLongerThanCells) {
     EXPECT_GT(tally.easy + tally.thin + tally.hard, 100);
 }
 
-TEST_P(ShapesOf, areRightFarFromIndexZeroAndOnTurnedLattices) {
+TEST_P(ShapesOf, AreRightFarFromIndexZeroAndOnTurnedLattices) {
     Tally tally;
     const std::uint64_t seed = 117'000 + 1000 * std::uint64_t(GetParam());
     const TetMesh mesh = rastertest::zooMesh(GetParam(), 400, seed, 9, Vec3d(-1), Vec3d(20));
@@ -133,7 +133,7 @@ ShapeGrade gradeOf(const std::array<Vec3d, 4>& nodes) {
     return shapeElement(mesh, frameNodes(mesh, kUnit, {}), 0).grade;
 }
 
-TEST(ElementShape, ordinaryElementsAreEasyAndFlatOnesHard) {
+TEST(ElementShape, OrdinaryElementsAreEasyAndFlatOnesHard) {
     for (const double size : {1e-3, 0.1, 1.0, 10.0, 100.0}) {
         EXPECT_EQ(gradeOf({Vec3d{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}}), ShapeGrade::easy)
             << size;
@@ -146,7 +146,7 @@ TEST(ElementShape, ordinaryElementsAreEasyAndFlatOnesHard) {
     EXPECT_EQ(gradeOf({Vec3d{0, 0, 0}, {9000, 0, 0}, {0, 9000, 0}, {0, 0, 9000}}), ShapeGrade::hard);
 }
 
-TEST(ElementShape, distancesAreThoseOfTheClosedForm) {
+TEST(ElementShape, DistancesAreThoseOfTheClosedForm) {
     const TetMesh mesh = oneElement({Vec3d{10, 20, 30}, {18, 20, 30}, {10, 28, 30}, {10, 20, 38}});
     const ElementShape shape = shapeElement(mesh, frameNodes(mesh, kUnit, {}), 0);
     EXPECT_EQ(shape.first, Vec3i(10, 20, 30));

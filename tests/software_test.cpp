@@ -24,7 +24,7 @@ double exactError(const NodeFrame& frame, const TetMesh& mesh, std::size_t node,
     return std::fabs(difference.get_d());
 }
 
-TEST(NodeFrame, keepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
+TEST(NodeFrame, KeepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
     std::mt19937_64 random(7);
     for (const double offset : {0.0, 1.0, 1e6, -1e9}) {
         TetMesh mesh;
@@ -41,7 +41,7 @@ TEST(NodeFrame, keepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
     }
 }
 
-TEST(NodeFrame, turnedLatticesAreAsAccurate) {
+TEST(NodeFrame, TurnedLatticesAreAsAccurate) {
     TetMesh mesh;
     std::mt19937_64 random(8);
     std::uniform_real_distribution<double> uniform(-10, 10);
@@ -52,7 +52,7 @@ TEST(NodeFrame, turnedLatticesAreAsAccurate) {
         for (std::size_t a = 0; a < 3; ++a) EXPECT_LE(exactError(frame, mesh, n, a), 4 * 0x1p-53);
 }
 
-TEST(ElementDepth, isTheDistanceToTheNearestFacePlane) {
+TEST(ElementDepth, IsTheDistanceToTheNearestFacePlane) {
     TetMesh mesh;
     mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
     mesh.tets = {{0, 1, 2, 3}, {1, 0, 2, 3}};  // both orientations
@@ -66,7 +66,7 @@ TEST(ElementDepth, isTheDistanceToTheNearestFacePlane) {
     }
 }
 
-TEST(ElementDepth, survivesNeedlesThatDoubleCannotResolve) {
+TEST(ElementDepth, SurvivesNeedlesThatDoubleCannotResolve) {
     TetMesh mesh;
     const double w = 1e-9;
     mesh.points = {{0, 0, 0}, {100.1, 70.3, 33.7}, {100.1 + w, 70.3, 33.7}, {100.1, 70.3 + w, 33.7 + w}};
@@ -76,7 +76,7 @@ TEST(ElementDepth, survivesNeedlesThatDoubleCannotResolve) {
     EXPECT_NEAR(deep, 0.0, 1e-4);
 }
 
-TEST(ElementBins, holdEveryElementWhoseBoxHasAPointOfTheRegion) {
+TEST(ElementBins, HoldEveryElementWhoseBoxHasAPointOfTheRegion) {
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> place(-5, 70), extent(-3, 3);
     TetMesh mesh;
@@ -117,7 +117,7 @@ TEST(ElementBins, holdEveryElementWhoseBoxHasAPointOfTheRegion) {
     }
 }
 
-TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
+TEST(SoftwareResampler, DeliversEveryBoxOnceEvenEmptyOnes) {
     TetMesh mesh;
     mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
     mesh.tets = {{0, 1, 2, 3}};
@@ -140,7 +140,7 @@ TEST(SoftwareResampler, deliversEveryBoxOnceEvenEmptyOnes) {
     EXPECT_EQ(statistics.count(counted::coveredPoints), 165);  // points with i + j + k <= 8: 11 choose 3
 }
 
-TEST(SoftwareResampler, refusesLatticesThatCannotBe) {
+TEST(SoftwareResampler, RefusesLatticesThatCannotBe) {
     TetMesh mesh;
     const SoftwareResampler software;
     const auto bound = software.bind(mesh, {}, {});
@@ -153,7 +153,7 @@ TEST(SoftwareResampler, refusesLatticesThatCannotBe) {
     EXPECT_THROW(bound->resample(Lattice::axisParallel({0, 0, 0}, 1), {&far, 1}, ignore, {}), InputError);
 }
 
-TEST(SoftwareResampler, aTargetThatIsAskedForRuns) {
+TEST(SoftwareResampler, ATargetThatIsAskedForRuns) {
     TetMesh mesh;
     const SoftwareResampler software;
     ASSERT_FALSE(software.targets().empty());
@@ -163,7 +163,7 @@ TEST(SoftwareResampler, aTargetThatIsAskedForRuns) {
     EXPECT_THROW(software.bind(mesh, {}, {.target = "no such"}), InputError);
 }
 
-TEST(Registry, findsByNameAndListsTheNamesOtherwise) {
+TEST(Registry, FindsByNameAndListsTheNamesOtherwise) {
     EXPECT_EQ(findResampler("software").name(), "software");
     try {
         findResampler("hardware");

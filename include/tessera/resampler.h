@@ -17,6 +17,7 @@
 
 namespace tessera {
 
+class DeviceSlots;
 class SharedElementIndex;
 
 /// How a resampler keeps a value before it is handed over as a float. The normalised formats divide the
@@ -64,6 +65,12 @@ class BoundResampler {
     /// a box of more than 2^31 - 1 points.
     virtual ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
                                         const BlockSink& sink, const Execution& execution) = 0;
+
+    /// resample() into slots on a device, one a box. Algorithms on that device leave their samples there;
+    /// others, and those on another target, upload their blocks. Throws InputError besides where the slots
+    /// have other channels or, on their own target, another format.
+    virtual ResampleStatistics resampleToDevice(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                                DeviceSlots& slots, const Execution& execution);
 };
 
 /// What an algorithm is and can do.

@@ -11,10 +11,10 @@ namespace tessera {
 
 /// Which faces the elements share, compared by node indices.
 struct FaceMatching {
-    std::vector<BoundaryFace> boundary;  ///< of elements that aren't flat: faces that no other such element
-                                         ///< has; ascending by element
-    std::vector<BoundaryFace>
-        lone;  ///< of elements that aren't flat: faces that no other element at all has; ascending by element
+    /// of elements that aren't flat: faces that no other such element has; ascending by element
+    std::vector<BoundaryFace> boundary;
+    /// of elements that aren't flat: faces that no other element at all has; ascending by element
+    std::vector<BoundaryFace> lone;
     std::int64_t singleFaces = 0;        ///< faces of one element only, flat elements included
     std::int64_t pairedFaces = 0;        ///< faces of exactly two elements, flat elements included
     std::int64_t crowdedFaces = 0;       ///< faces of more than two elements, flat elements included

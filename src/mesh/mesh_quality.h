@@ -16,9 +16,9 @@ struct MeshQuality {
     std::int64_t coincidentNodes = 0;  ///< nodes at exactly the place of an earlier node
     std::int64_t boundaryFaces = 0;    ///< faces of one element only
     std::int64_t innerFaces = 0;       ///< faces of exactly two elements
-    std::int64_t nonConformingFaces =
-        0;  ///< faces of more than two elements, and boundary faces that lie inside the mesh: over another
-            ///< boundary face, or with a node of the mesh on them that isn't one of their own
+    /// faces of more than two elements, and boundary faces that lie inside the mesh: over another boundary
+    /// face, or with a node of the mesh on them that isn't one of their own
+    std::int64_t nonConformingFaces = 0;
     double smallestEdgeWorld = 0;
     double largestEdgeWorld = 0;
     double smallestVolumeWorld = 0;  ///< |volume| of elements that are not flat; 0 when all are

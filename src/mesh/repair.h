@@ -37,8 +37,8 @@ struct RepairReport {
     double keptVolumeWorld = 0;                          ///< of these
     double volumeBeforeWorld = 0, volumeAfterWorld = 0;  ///< sum of the elements' |volume|
     double volumeChangeWorld = 0;  ///< sum of what single operations lost or gained; within the bound
-    double boundaryDeviationWorld =
-        0;  ///< how far a place of the boundary can have moved, all steps together
+    /// how far a place of the boundary can have moved, all steps together
+    double boundaryDeviationWorld = 0;
 
     struct FieldRange {
         std::string field;

@@ -21,11 +21,11 @@ struct ArrayInfo {
 struct RawBlock {
     std::size_t part = 0;  ///< which of a mesh's files it comes from, see ReadOptions::otherParts
     std::vector<Vec3d> points;
-    std::vector<std::int64_t>
-        nodeIds;     ///< the file's number of every point, where blocks share points; else empty
+    /// the file's number of every point, where blocks share points; else empty
+    std::vector<std::int64_t> nodeIds;
     CellList cells;  ///< 3D cells that take part; node indices and face streams are checked
-    std::vector<std::int64_t>
-        sourceCell;  ///< position of each of these cells in the block; empty when it is the same
+    /// position of each of these cells in the block; empty when it is the same
+    std::vector<std::int64_t> sourceCell;
     std::int64_t sourceCells = 0;   ///< cells of the block of any kind
     std::vector<Field> fields;      ///< point: a tuple for every point; cell: one for every source cell
     std::vector<ArrayInfo> arrays;  ///< all arrays there are, asked for or not
@@ -34,8 +34,8 @@ struct RawBlock {
 /// A mesh before splitting.
 struct RawMesh {
     std::vector<RawBlock> blocks;
-    ImportStatistics statistics;  ///< what the reader of the format counts: cells, skipped, blanked, higher
-                                  ///< order, warnings
+    /// what the reader of the format counts: cells, skipped, blanked, higher order, warnings
+    ImportStatistics statistics;
 };
 
 /// What a message calls the mesh: its file, and how many other parts it has.

@@ -15,8 +15,8 @@ struct ScalarImage {
     int height = 0;
     std::vector<float> values;           ///< width x height
     std::vector<std::uint8_t> coverage;  ///< width x height: 0 where the pixel has no value
-    std::vector<std::uint8_t>
-        outlines;  ///< width x height, or empty: 1 where a brick's edge is drawn over it
+    /// width x height, or empty: 1 where a brick's edge is drawn over it
+    std::vector<std::uint8_t> outlines;
 
     std::size_t offset(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
 };

@@ -10,7 +10,6 @@ namespace tessera {
 
 namespace {
 
-constexpr int kLargestExponent = 60;
 /// An r32f element whose values are all smaller than this, but not zero, may be flushed on the device.
 constexpr double kSmallestCode = 0x1p-90;
 
@@ -29,42 +28,6 @@ double nodeCode(const ChannelCoding& coding, double value) {
 }
 
 }  // namespace
-
-ChannelCoding::ChannelCoding(const Field& field, int component, SampleFormat format)
-    : field_(&field), component_(component), format_(format) {
-    const ValueRange range = finiteFloatRange(field, component);
-    if (range.empty()) return;
-    // Far below any float the power of two itself would be infinite; such values count as zero.
-    const double most = double(std::max(std::fabs(float(range.min)), std::fabs(float(range.max))));
-    if (most > 0) {
-        const int exponent = kLargestExponent - std::ilogb(most);
-        scale_ = std::ldexp(1.0, exponent);
-        inverseScale_ = std::ldexp(1.0, -exponent);
-    }
-    min_ = range.min;
-    width_ = range.width();
-    low_ = float(range.min);
-    high_ = float(range.max);
-}
-
-double ChannelCoding::encode(double value) const {
-    if (format_ == SampleFormat::r32f) return value * scale_;
-    return width_ > 0 ? (value - min_) / width_ : 0.0;
-}
-
-double ChannelCoding::scale() const {
-    return format_ == SampleFormat::r32f ? inverseScale_ : width_;
-}
-
-double ChannelCoding::offset() const {
-    return format_ == SampleFormat::r32f ? 0.0 : min_;
-}
-
-SampleMarks sampleMarks(SampleFormat format) {
-    if (format == SampleFormat::r32f)
-        return {-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(), 0x1p100f};
-    return {-1.0f, 2.0f, 1.5f};
-}
 
 bool isSafeOnDevice(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element) {
     if (coding.isOfCells()) return true;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "slab/prepared_region.h"
+#include "raster/prepared_region.h"
 
 namespace tessera {
 
@@ -16,7 +16,7 @@ struct DecidedPoint {
 };
 
 /// Samples elements that no shader can decide, by the software resampler's scan: the channels of one pass.
-std::vector<DecidedPoint> decideHardElements(const SlabInputs& inputs, const PreparedRegion& region,
+std::vector<DecidedPoint> decideHardElements(const RasterInputs& inputs, const PreparedRegion& region,
                                              std::size_t pass, const Execution& execution);
 
 }  // namespace tessera

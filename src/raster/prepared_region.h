@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "device/texture_slots.h"
 #include "index_space/node_frame.h"
 #include "raster/channel_coding.h"
 #include "raster/element_shape.h"
@@ -30,7 +31,7 @@ struct alignas(32) ThinGeometry {
 static_assert(sizeof(EasyGeometry) == 80 && sizeof(ThinGeometry) == 160 && sizeof(ChannelRecord) == 32);
 
 /// Channels that one pass over a region samples: those of a target's pixel.
-inline constexpr std::size_t kChannelsAPass = 4;
+inline constexpr std::size_t kChannelsAPass = kChannelsAGroup;
 
 /// Records of one grade, in no order; element i's channels of a pass are channels[pass][i * channelCount
 /// ...].

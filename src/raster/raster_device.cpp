@@ -25,21 +25,6 @@ int levelsOf(SampleFormat format) {
     return format == SampleFormat::r16 ? 65535 : 0;
 }
 
-GLenum internalFormat(SampleFormat format, int channels) {
-    const bool isOne = channels == 1;
-    switch (format) {
-        case SampleFormat::r32f:
-            return isOne ? GL_R32F : GL_RGBA32F;
-        case SampleFormat::r16f:
-            return isOne ? GL_R16F : GL_RGBA16F;
-        case SampleFormat::r16:
-            return isOne ? GL_R16 : GL_RGBA16;
-        case SampleFormat::r8:
-            return isOne ? GL_R8 : GL_RGBA8;
-    }
-    return GL_R32F;
-}
-
 /// Counts while it lives: a query that stays open after a failure would keep all others from beginning.
 class FragmentCount {
   public:
@@ -123,7 +108,7 @@ const GlProgram& RasterDevice::program(GlContext& context, const Variant& varian
 }
 
 void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size) {
-    const GLenum format = internalFormat(format_, channels_);
+    const GLenum format = textureFormat(format_, channels_);
     const bool fits = target_.format == format && target_.size.x >= size.x && target_.size.y >= size.y &&
                       target_.size.z >= size.z;
     if (fits) return;
@@ -136,7 +121,7 @@ void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size) {
     made.framebuffer = GlFramebuffer(context);
     made.codes = GlTexture(context, GL_TEXTURE_3D, format, room.x, room.y, room.z);
     made.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
-    if (needsCoverageTarget(format_))
+    if (needsCoverageTexture(format_))
         made.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, room.x, room.y, room.z);
     if (isLayered_) {
         made.framebuffer.attach(GL_COLOR_ATTACHMENT0, made.codes);
@@ -390,32 +375,16 @@ RasterImage RasterDevice::readBack(GlContext& context) {
     return image;
 }
 
-void RasterDevice::addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format) {
+void RasterDevice::copyTo(GlContext& context, const IndexBox& points, const SlotPlace& place,
+                          const Vec3i& origin) {
     const GlFunctions& gl = context.functions();
-    const Vec3i size = glm::max(samples.box.size(), Vec3i(1));
-    DeviceSamples::Group group;
-    group.channels = channels;
-    const int recorded = std::max(1, channels);
-    group.codes = GlTexture(context, GL_TEXTURE_3D, internalFormat(format, recorded), size.x, size.y, size.z);
-    const float mark = sampleMarks(format).uncovered;
-    const float codes[4] = {mark, mark, mark, mark}, zero[4] = {0, 0, 0, 0};
-    gl.ClearTexImage(group.codes.id(), 0, recorded == 1 ? GL_RED : GL_RGBA, GL_FLOAT, codes);
-    if (needsCoverageTarget(format)) {
-        group.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, size.x, size.y, size.z);
-        gl.ClearTexImage(group.coverage.id(), 0, GL_RED, GL_FLOAT, zero);
-    }
-    samples.groups.push_back(std::move(group));
-}
-
-void RasterDevice::copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at) {
-    const GlFunctions& gl = context.functions();
-    const auto copy = [&](const GlTexture& from, const GlTexture& to) {
-        gl.CopyImageSubData(from.id(), GL_TEXTURE_3D, 0, 0, 0, 0, to.id(), GL_TEXTURE_3D, 0, at.x, at.y, at.z,
-                            size_.x, size_.y, size_.z);
+    const Vec3i from = points.min - origin, size = points.size();
+    const auto copy = [&](const GlTexture& source, const GlTexture& to) {
+        gl.CopyImageSubData(source.id(), GL_TEXTURE_3D, 0, from.x, from.y, from.z, to.id(), GL_TEXTURE_3D, 0,
+                            place.at.x, place.at.y, place.at.z, size.x, size.y, size.z);
     };
-    copy(target_.codes, samples.groups[group].codes);
-    if (target_.coverage) copy(target_.coverage, samples.groups[group].coverage);
-    finishRegion(context);
+    copy(target_.codes, *place.codes);
+    if (target_.coverage) copy(target_.coverage, *place.coverage);
 }
 
 RasterCounts RasterDevice::takeCounts() {

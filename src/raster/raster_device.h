@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "device/texture_slots.h"
 #include "gl/gl_program.h"
 #include "gl/gl_thread.h"
-#include "raster/device_samples.h"
 #include "raster/hard_elements.h"
 #include "raster/prepared_region.h"
 #include "tessera/resampler.h"
@@ -50,10 +50,11 @@ class RasterDevice {
     RasterImage readBack(GlContext& context);
     RasterCounts takeCounts();
 
-    /// Adds textures for a group of channels to samples whose box is set, without values yet.
-    void addGroup(GlContext& context, DeviceSamples& samples, int channels, SampleFormat format);
-    /// Copies the region, rendered with layers along z, to its place in a group.
-    void copyTo(GlContext& context, DeviceSamples& samples, std::size_t group, const Vec3i& at);
+    /// Copies some points of the region, rendered with layers along z and its lowest point at `origin`, to
+    /// their place in a slot. finishRegion() ends the region.
+    void copyTo(GlContext& context, const IndexBox& points, const SlotPlace& place, const Vec3i& origin);
+    /// In place of readBack() where samples stay: collects the queries and gives the records' buffers back.
+    void finishRegion(GlContext& context);
 
     /// Renders layer by layer, as on devices that can't choose a layer in the vertex shader; for tests.
     void forbidVertexShaderLayer() { isLayered_ = false; }
@@ -100,8 +101,6 @@ class RasterDevice {
     }
     /// Marks that the device has been given all its work on what was last uploaded.
     void release(GlContext& context, Stream& stream);
-    /// Collects the queries and gives the records' buffers back.
-    void finishRegion(GlContext& context);
 
     GlThread& thread_;
     bool isLayered_;

@@ -10,9 +10,9 @@
 
 #include "base/parallel.h"
 #include "base/timer.h"
+#include "device/texture_slots.h"
 #include "gl/gl_platform.h"
 #include "index_space/element_bins.h"
-#include "raster/device_samples.h"
 #include "raster/hard_elements.h"
 #include "raster/raster_device.h"
 #include "raster/regions.h"
@@ -46,16 +46,16 @@ struct RegionJob {
     std::vector<std::future<RasterImage>> images;
 };
 
-class BoundRaster : public BoundRasterResampler {
+class BoundRaster : public BoundResampler {
   public:
     BoundRaster(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
-                GlPlatform platform, const SliceGenerator& generator, bool isPublished)
+                GlPlatform platform, std::shared_ptr<const SliceGenerator> generator, bool isPublished)
         : mesh_(mesh, fields, routed(options, isPublished)),
           format_(options.format),
           isPublished_(isPublished),
           platform_(platform),
           target_(nameOf(platform)),
-          generator_(generator) {
+          generator_(std::move(generator)) {
         if (mesh.elementCount() >= std::int64_t(1) << 30)
             throw InputError("a mesh may have at most 2^30 - 1 elements");
         for (const int f : fields) {
@@ -74,19 +74,19 @@ class BoundRaster : public BoundRasterResampler {
         return Run(*this, device, lattice, boxes, sink, execution).all();
     }
 
-    std::shared_ptr<const DeviceSamples> resampleOnDevice(const Lattice& lattice, const IndexBox& box,
-                                                          const Execution& execution) override {
-        checkLattice(lattice, std::span(&box, 1));
+    ResampleStatistics resampleToDevice(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                        DeviceSlots& slots, const Execution& execution) override {
         RasterDevice& device = sharedRasterDevice(platform_);
+        auto* textures = dynamic_cast<TextureSlots*>(&slots);
+        const bool areHere = textures && &textures->thread() == &device.thread();
+        checkSlots(slots, areHere);
+        // Slots want layers along z, and the published methods' results depend on the axis.
+        if (!areHere || isPublished_)
+            return BoundResampler::resampleToDevice(lattice, boxes, slots, execution);
+        checkLattice(lattice, boxes);
         const std::lock_guard lock(device.exclusive);
-        const std::shared_ptr<DeviceSamples> samples = makeDeviceSamples(device.thread());
-        samples->box = box;
-        samples->marks = sampleMarks(format_);
-        for (const ChannelCoding& coding : channels_)
-            samples->decodings.push_back({coding.scale(), coding.offset()});
         const BlockSink nobody = [](std::size_t, const Block&) {};
-        Run(*this, device, lattice, std::span(&box, 1), nobody, execution, samples.get()).all();
-        return samples;
+        return Run(*this, device, lattice, boxes, nobody, execution, textures).all();
     }
 
   private:
@@ -95,14 +95,14 @@ class BoundRaster : public BoundRasterResampler {
       public:
         Run(const BoundRaster& bound, RasterDevice& device, const Lattice& lattice,
             std::span<const IndexBox> boxes, const BlockSink& sink, const Execution& execution,
-            DeviceSamples* kept = nullptr)
+            const TextureSlots* slots = nullptr)
             : bound_(bound),
               device_(device),
               lattice_(lattice),
               boxes_(boxes),
               sink_(sink),
               execution_(execution),
-              kept_(kept) {}
+              slots_(slots) {}
 
         ResampleStatistics all();
 
@@ -110,6 +110,8 @@ class BoundRaster : public BoundRasterResampler {
         void plan();
         void start(std::size_t region);
         void generate(RegionJob& job, std::size_t pass);
+        /// Copies a rendered region into the slots.
+        void keep(GlContext& context, const RasterRegion& region, std::size_t pass);
         void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch);
         void finishOldest();
         void copyPart(const RasterRegion& region, const RasterRegion::Part& part,
@@ -129,7 +131,7 @@ class BoundRaster : public BoundRasterResampler {
         std::span<const IndexBox> boxes_;
         const BlockSink& sink_;
         const Execution& execution_;
-        DeviceSamples* kept_;  ///< where samples stay on the device; the sink then gets nothing
+        const TextureSlots* slots_;  ///< where samples stay on the device; the sink then gets nothing
 
         std::optional<TetMesh> part_;          ///< what is near the boxes, where that is little
         std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
@@ -144,6 +146,15 @@ class BoundRaster : public BoundRasterResampler {
         std::mutex mutex_;
     };
 
+    void checkSlots(const DeviceSlots& slots, bool areHere) const {
+        if (slots.channels() != int(channels_.size()))
+            throw InputError("slots of " + std::to_string(slots.channels()) + " channels can't take " +
+                             std::to_string(channels_.size()));
+        if (areHere && slots.format() != format_)
+            throw InputError("slots of " + std::string(nameOf(slots.format())) + " can't take samples in " +
+                             std::string(nameOf(format_)));
+    }
+
     /// The published methods' results depend on the slice axis, which goes by the whole mesh.
     static BindOptions routed(BindOptions options, bool isPublished) {
         if (isPublished) options.route = Route::pass;
@@ -155,7 +166,7 @@ class BoundRaster : public BoundRasterResampler {
     bool isPublished_;
     GlPlatform platform_;
     std::string target_;
-    const SliceGenerator& generator_;
+    std::shared_ptr<const SliceGenerator> generator_;
     std::vector<ChannelCoding> channels_;
 };
 
@@ -168,12 +179,6 @@ ResampleStatistics BoundRaster::Run::all() {
         for (const Field& field : part_->fields)
             for (int k = 0; k < field.components; ++k, ++c) channels_[c] = channels_[c].on(field);
     }
-    if (kept_)
-        device_.thread().run([&](GlContext& context) {
-            const RasterInputs all = inputs();
-            for (std::size_t pass = 0; pass < all.passCount(); ++pass)
-                device_.addGroup(context, *kept_, int(all.channelsOf(pass).size()), bound_.format_);
-        });
     plan();
     statistics_.addMs(stage::bin, timer.restart());
     try {
@@ -194,7 +199,7 @@ ResampleStatistics BoundRaster::Run::all() {
         throw;
     }
     const RasterCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
-    for (std::size_t b = 0; b < boxes_.size() && !kept_; ++b)
+    for (std::size_t b = 0; b < boxes_.size() && !slots_; ++b)
         if (partCounts_[b] == 0) {
             open(b);
             deliver(b);
@@ -222,7 +227,7 @@ void BoundRaster::Run::plan() {
         for (const RasterRegion::Part& part : region.parts) ++partCounts_[part.box];
     }
     frame_ = frameNodes(mesh(), lattice_, execution_);
-    axes_ = SliceAxes::along(kept_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
+    axes_ = SliceAxes::along(slots_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
     bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
     statistics_.add(counted::elementsNear, mesh().elementCount());
     statistics_.add(counted::coveredPoints, 0);
@@ -244,15 +249,23 @@ void BoundRaster::Run::start(std::size_t region) {
             device_.begin(context, job.prepared, inputs, pass);
         }));
         generate(job, pass);
-        if (kept_)
-            job.draws.push_back(device_.thread().post([this, pass, at = region](GlContext& context) {
-                device_.copyTo(context, *kept_, pass, regions_[at].points.min - kept_->box.min);
-            }));
+        if (slots_)
+            job.draws.push_back(device_.thread().post(
+                [this, pass, at = job.region](GlContext& context) { keep(context, *at, pass); }));
         else
             job.images.push_back(
                 device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
     }
     job.batches.clear();
+}
+
+void BoundRaster::Run::keep(GlContext& context, const RasterRegion& region, std::size_t pass) {
+    for (const RasterRegion::Part& part : region.parts) {
+        SlotPlace place = slots_->place(part.box, pass);
+        place.at += part.points.min - boxes_[part.box].min;
+        device_.copyTo(context, part.points, place, region.points.min);
+    }
+    device_.finishRegion(context);
 }
 
 void BoundRaster::Run::post(RegionJob& job, std::shared_ptr<const SliceBatch> batch) {
@@ -288,9 +301,9 @@ void BoundRaster::Run::generate(RegionJob& job, std::size_t pass) {
                 input.published = prepared.published;
                 input.nodeCodes = prepared.nodeCodes[pass];
                 input.channels = inputs.recordedChannels(pass);
-                bound_.generator_.emitPublished(input, *batch);
+                bound_.generator_->emitPublished(input, *batch);
             } else {
-                bound_.generator_.emit(input, *batch);
+                bound_.generator_->emit(input, *batch);
             }
             const std::lock_guard guard(mutex_);
             if (pass == 0) {
@@ -316,7 +329,7 @@ void BoundRaster::Run::finishOldest() {
     for (auto& draw : job.draws) draw.get();
     for (auto& image : job.images) images.push_back(image.get());
     job.prepared = {};
-    if (kept_) {
+    if (slots_) {
         jobs_.pop_front();
         return;
     }
@@ -457,15 +470,9 @@ std::vector<std::string> RasterResampler::targets() const {
 
 std::unique_ptr<BoundResampler> RasterResampler::bind(const TetMesh& mesh, std::span<const int> fields,
                                                       const BindOptions& options) const {
-    return bindToDevice(mesh, fields, options);
-}
-
-std::unique_ptr<BoundRasterResampler> RasterResampler::bindToDevice(const TetMesh& mesh,
-                                                                    std::span<const int> fields,
-                                                                    const BindOptions& options) const {
     std::optional<GlPlatform> wanted;
     if (!options.target.empty()) wanted = parseGlPlatform(options.target);
-    return std::make_unique<BoundRaster>(mesh, fields, options, chooseGlPlatform(wanted), *generator_,
+    return std::make_unique<BoundRaster>(mesh, fields, options, chooseGlPlatform(wanted), generator_,
                                          method_ == Method::published);
 }
 

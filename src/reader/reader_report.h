@@ -12,8 +12,8 @@ namespace tessera {
 enum class ReaderOutcome : std::uint32_t {
     meshInMemory,  ///< the mesh's packet is in the shared memory
     meshFollows,   ///< it follows in the pipe, where a limit on file sizes forbids the shared memory
-    otherFormat,   ///< the file has a format that this program doesn't read; a message follows, also for the
-                   ///< ones below
+    /// the file has a format that this program doesn't read; a message follows, also for the ones below
+    otherFormat,
     inputError,
     ioError,
     internalError,

@@ -31,10 +31,10 @@ struct ContractReport {
     std::int64_t spill = 0;       ///< clause 2: covered, further from every element than the bound
     std::int64_t overshoot = 0;   ///< clause 3: outside what every right owner's node values allow
     std::int64_t inaccurate = 0;  ///< clause 4: too far from the interpolation of every right owner
-    std::int64_t wrongOwner =
-        0;  ///< clause 5: the value of an element that isn't a right owner, or channels of different owners
-    std::int64_t wrongValidity =
-        0;  ///< finite where the owner's node values aren't all, or the other way round
+    /// clause 5: the value of an element that isn't a right owner, or channels of different owners
+    std::int64_t wrongOwner = 0;
+    /// finite where the owner's node values aren't all, or the other way round
+    std::int64_t wrongValidity = 0;
     /// Largest difference from the exact value over what clause 4 allows, at points that pass.
     double worstRatio = 0;
     std::string worstRatioPlace;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <unordered_map>
 
@@ -25,11 +26,7 @@ bool insideBounds(const DepthKey& key, const PlanFrame& frame) {
     return !intersect(kept, {first, first + frame.brickCells}).empty();
 }
 
-// Bricks [min, max] whose touch boxes may meet a box in index space.
-struct BrickRange {
-    Vec3i min, max;
-};
-
+// Bricks whose touch boxes may meet a box in index space.
 BrickRange bricksMeeting(const Box3d& index, int brickCells) {
     // What lies beyond the range of indices is far outside the bounds; it must not overflow here.
     constexpr double kFar = 1 << 30;
@@ -69,46 +66,120 @@ Box3d brickTouchBox(const Vec3i& index, int brickCells) {
     return {first - kBrickSlackVoxels, first + double(brickCells)};
 }
 
-BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution)
-    : mesh_(&mesh), frame_(frame) {
-    allocateRoots(execution);
+namespace {
+
+/// The eight children of a brick, and which of them an element touches.
+class BrickChildren {
+  public:
+    BrickChildren(const DepthKey& parent, const PlanFrame& frame) {
+        for (unsigned c = 0; c < 8; ++c) {
+            keys_[c] = childKey(parent, c);
+            boxes_[c] = brickTouchBox(keys_[c].index, frame.brickCells);
+            allowed_[c] = insideBounds(keys_[c], frame);
+        }
+    }
+    const DepthKey& key(unsigned child) const { return keys_[child]; }
+
+    /// @param element one that touches the parent, in index space of the children's depth.
+    ChildBits touchedBy(const ElementOverlap& element) const {
+        // Per axis the lower and the upper children share their bounds.
+        const Box3d& own = element.bounds();
+        std::array<bool, 6> touched;
+        for (int a = 0; a < 3; ++a)
+            for (int upper = 0; upper < 2; ++upper) {
+                const Box3d& half = boxes_[upper ? 7 : 0];
+                touched[std::size_t(2 * a + upper)] = own.min[a] < half.max[a] && own.max[a] >= half.min[a];
+            }
+        unsigned bits = 0;
+        for (std::size_t c = 0; c < 8; ++c)
+            if (allowed_[c] && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
+                bits |= 1u << c;
+        if (std::has_single_bit(bits)) return ChildBits(bits);
+        for (std::size_t c = 0; c < 8; ++c)
+            if ((bits >> c & 1) && !element.touches(boxes_[c])) bits &= ~(1u << c);
+        return ChildBits(bits);
+    }
+
+  private:
+    std::array<DepthKey, 8> keys_;
+    std::array<Box3d, 8> boxes_;
+    std::array<bool, 8> allowed_;
+};
+
+/// The bricks of depth 0 that an element can touch.
+BrickRange rootsMeeting(const ElementOverlap& element, const PlanFrame& frame, const BrickRange& all) {
+    const BrickRange range = bricksMeeting(element.bounds(), frame.brickCells);
+    return {glm::max(range.min, all.min), glm::min(range.max, all.max)};
 }
 
-void BrickPlan::allocateRoots(const Execution& execution) {
-    const double spacing = frame_.spacingWorld(Depth(0));
-    const BrickRange all = clippedRange(frame_, Depth(0));
-    const std::int64_t count = mesh_->elementCount();
+bool touchesRoot(const ElementOverlap& element, const BrickRange& roots, const Vec3i& root,
+                 const PlanFrame& frame) {
+    if (!insideBounds({Depth(0), root}, frame)) return false;
+    const Box3d box = brickTouchBox(root, frame.brickCells);
+    return roots.min == roots.max ? element.boundsTouch(box) : element.touches(box);
+}
+
+/// A box that holds whatever counts as touching the brick, world units.
+Box3d boxAround(const DepthKey& key, const PlanFrame& frame) {
+    const double spacing = frame.spacingWorld(key.depth);
+    const Box3d box = brickTouchBox(key.index, frame.brickCells);
+    Box3d world{frame.originWorld + box.min * spacing, frame.originWorld + box.max * spacing};
+    const Vec3d most = glm::max(glm::abs(world.min), glm::abs(world.max)) + glm::abs(frame.originWorld);
+    const Vec3d margin = spacing * 0x1p-16 + most * 0x1p-50;
+    world.min -= margin;
+    world.max += margin;
+    return world;
+}
+
+}  // namespace
+
+BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution,
+                     const ElementIndex* index)
+    : mesh_(&mesh), frame_(frame), rootRange_(clippedRange(frame, Depth(0))) {
+    allocateRoots(index, execution);
+}
+
+ElementOverlap BrickPlan::overlap(std::int32_t element, Depth depth) const {
+    return ElementOverlap(
+        elementInIndexSpace(*mesh_, element, frame_.originWorld, frame_.spacingWorld(depth)));
+}
+
+void BrickPlan::allocateRoots(const ElementIndex* index, const Execution& execution) {
+    // Within bounds an index leaves most of the mesh alone.
+    std::vector<std::int32_t> near;
+    const bool isPart = index && frame_.boundsWorld;
+    if (isPart) {
+        Box3d box = boxAround({Depth(0), rootRange_.min}, frame_);
+        box.include(boxAround({Depth(0), rootRange_.max}, frame_).max);
+        index->query(box, near);
+    }
+    const std::int64_t count = isPart ? std::int64_t(near.size()) : mesh_->elementCount();
+    const auto element = [&](std::int64_t n) { return isPart ? near[std::size_t(n)] : std::int32_t(n); };
     std::vector<std::vector<std::pair<Vec3i, std::int32_t>>> found(
         std::size_t((count + kElementChunk - 1) / kElementChunk));
     parallelForChunks(execution, count, kElementChunk, [&](std::int64_t begin, std::int64_t end) {
         auto& list = found[std::size_t(begin / kElementChunk)];
-        for (std::int64_t e = begin; e < end; ++e) {
-            prefetchNodes(*mesh_, std::min(e + kPrefetchElements, count - 1));
-            const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
-            BrickRange range = bricksMeeting(element.bounds(), frame_.brickCells);
-            range = {glm::max(range.min, all.min), glm::min(range.max, all.max)};
-            const bool single = range.min == range.max;
+        for (std::int64_t n = begin; n < end; ++n) {
+            prefetchNodes(*mesh_, element(std::min(n + kPrefetchElements, count - 1)));
+            const ElementOverlap own = overlap(element(n), Depth(0));
+            const BrickRange range = rootsMeeting(own, frame_, rootRange_);
             for (int z = range.min.z; z <= range.max.z; ++z)
                 for (int y = range.min.y; y <= range.max.y; ++y)
-                    for (int x = range.min.x; x <= range.max.x; ++x) {
-                        const Vec3i index{x, y, z};
-                        if (!insideBounds({Depth(0), index}, frame_)) continue;
-                        const Box3d box = brickTouchBox(index, frame_.brickCells);
-                        if (single ? element.boundsTouch(box) : element.touches(box))
-                            list.emplace_back(index, std::int32_t(e));
-                    }
+                    for (int x = range.min.x; x <= range.max.x; ++x)
+                        if (touchesRoot(own, range, {x, y, z}, frame_))
+                            list.emplace_back(Vec3i{x, y, z}, element(n));
         }
     });
     std::vector<Vec3i> roots;
     std::unordered_map<Vec3i, std::size_t, IndexHash> positions;
     for (const auto& list : found)
-        for (const auto& [index, element] : list) {
-            const auto [position, fresh] = positions.try_emplace(index, roots.size());
+        for (const auto& [root, touching] : list) {
+            const auto [position, fresh] = positions.try_emplace(root, roots.size());
             if (fresh) {
-                roots.push_back(index);
-                bricks_.emplace_back().key = {Depth(0), index};
+                roots.push_back(root);
+                bricks_.emplace_back().key = {Depth(0), root};
             }
-            bricks_[position->second].elements.push_back(element);
+            bricks_[position->second].elements.push_back(touching);
         }
     tree_ = GrowingTree(roots);
 }
@@ -122,38 +193,57 @@ std::vector<PlannedBrick*> BrickPlan::leaves() {
 
 // All eight, those without elements too.
 std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
-    const double spacing = frame_.spacingWorld(brick.key.depth + 1);
     std::vector<PlannedBrick> made(8);
-    std::array<Box3d, 8> boxes;
-    std::array<bool, 8> allowed;
-    for (unsigned c = 0; c < 8; ++c) {
-        made[c].key = childKey(brick.key, c);
-        boxes[c] = brickTouchBox(made[c].key.index, frame_.brickCells);
-        allowed[c] = insideBounds(made[c].key, frame_);
-    }
+    const BrickChildren children(brick.key, frame_);
+    for (unsigned c = 0; c < 8; ++c) made[c].key = children.key(c);
     const std::size_t count = brick.elements.size();
     for (std::size_t n = 0; n < count; ++n) {
         const std::int32_t e = brick.elements[n];
         prefetchNodes(*mesh_, brick.elements[std::min(n + std::size_t(kPrefetchElements), count - 1)]);
-        const ElementOverlap element(elementInIndexSpace(*mesh_, e, frame_.originWorld, spacing));
-        // Per axis the lower and the upper children share their bounds.
-        const Box3d& own = element.bounds();
-        std::array<bool, 6> touched;
-        for (int a = 0; a < 3; ++a)
-            for (int upper = 0; upper < 2; ++upper) {
-                const Box3d& half = boxes[upper ? 7 : 0];
-                touched[std::size_t(2 * a + upper)] = own.min[a] < half.max[a] && own.max[a] >= half.min[a];
-            }
-        std::array<std::size_t, 8> hits;
-        std::size_t hitCount = 0;
-        for (std::size_t c = 0; c < 8; ++c)
-            if (allowed[c] && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
-                hits[hitCount++] = c;
-        for (std::size_t i = 0; i < hitCount; ++i)
-            if (hitCount == 1 || element.touches(boxes[hits[i]])) made[hits[i]].elements.push_back(e);
+        unsigned bits = children.touchedBy(overlap(e, brick.key.depth + 1));
+        for (; bits != 0; bits &= bits - 1) made[std::size_t(std::countr_zero(bits))].elements.push_back(e);
     }
     splitSamples(brick, made);
     return made;
+}
+
+// As the splits from a root down to the brick would have left them.
+std::vector<std::int32_t> BrickPlan::elementsOf(const DepthKey& key, const ElementIndex& index) const {
+    std::vector<std::int32_t> elements;
+    index.query(boxAround(key, frame_), elements);
+    const int depths = key.depth.halvings();
+    const Vec3i root = key.index >> depths;
+    std::vector<BrickChildren> path;  // of the bricks above
+    for (int d = 0; d < depths; ++d) path.emplace_back(DepthKey{Depth(d), key.index >> (depths - d)}, frame_);
+    std::erase_if(elements, [&](std::int32_t e) {
+        const ElementOverlap own = overlap(e, Depth(0));
+        const BrickRange roots = rootsMeeting(own, frame_, rootRange_);
+        if (glm::clamp(root, roots.min, roots.max) != root || !touchesRoot(own, roots, root, frame_))
+            return true;
+        for (int d = 0; d < depths; ++d) {
+            const unsigned child = childNumber(key.index >> (depths - d - 1));
+            if (!(path[std::size_t(d)].touchedBy(overlap(e, Depth(d + 1))) >> child & 1)) return true;
+        }
+        return false;
+    });
+    return elements;
+}
+
+bool BrickPlan::merge(const DepthKey& parent, const ElementIndex& index) {
+    if (!tree_.merge(parent)) return false;
+    const TreeChange& change = tree_.change();
+    PlannedBrick merged;
+    merged.key = parent;
+    merged.elements = elementsOf(parent, index);
+    for (const GrowingLeaf& leaf : change.removed) {
+        const std::vector<std::uint32_t>& samples = bricks_[leaf.slot].samples;
+        merged.samples.insert(merged.samples.end(), samples.begin(), samples.end());
+        bricks_[leaf.slot] = {};
+    }
+    std::sort(merged.samples.begin(), merged.samples.end());
+    bricks_.resize(tree_.slotCount());
+    bricks_[change.added.front().slot] = std::move(merged);
+    return true;
 }
 
 void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick>& made) const {

@@ -10,7 +10,7 @@
 #include "brick/depth.h"
 #include "brick/growing_tree.h"
 #include "brick/overlap.h"
-#include "tessera/execution.h"
+#include "mesh/element_index.h"
 #include "tessera/mesh.h"
 
 namespace tessera {
@@ -38,22 +38,34 @@ struct PlannedBrick {
     double ratio = 0;                    ///< error-driven: what refinement goes by
 };
 
+/// Bricks min to max, both included.
+struct BrickRange {
+    Vec3i min, max;
+};
+
 /// A growing tree over the elements of a mesh: leaves are split on demand, and children that no element
 /// touches are dropped.
 class BrickPlan {
   public:
-    /// Allocates the bricks of depth 0.
-    BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution);
+    /// Allocates the bricks of depth 0. @param index of the mesh, or null: where the frame has bounds it
+    /// spares a pass over the whole mesh.
+    BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution,
+              const ElementIndex* index = nullptr);
 
     const PlanFrame& frame() const { return frame_; }
     std::size_t leafCount() const { return tree_.leafCount(); }
-    /// Ascending by depth, z, y, x; valid until the next split().
+    /// Ascending by depth, z, y, x; valid until the next split() or merge().
     std::vector<PlannedBrick*> leaves();
     Depth deepest() const { return tree_.deepest(); }
 
     /// Splits these leaves, and coarser neighbours until the tree is balanced again. When more than maxLeaves
     /// would stand, leaves everything as it was and returns false.
     bool split(std::span<const DepthKey> keys, std::size_t maxLeaves, const Execution& execution);
+
+    /// Makes a brick a leaf in place of its children, with the elements that it had before it was split and
+    /// its children's samples; false, and nothing changes, where its children are split or the tree would
+    /// not be balanced. Costs what lies in the brick.
+    bool merge(const DepthKey& parent, const ElementIndex& index);
 
     /// Depth `finest`, the deepest or below, becomes level 0.
     BrickTree tree(Depth finest) const;
@@ -62,12 +74,15 @@ class BrickPlan {
     std::function<Vec3d(std::uint32_t)> placeOfSample;
 
   private:
-    void allocateRoots(const Execution& execution);
+    ElementOverlap overlap(std::int32_t element, Depth depth) const;
+    void allocateRoots(const ElementIndex* index, const Execution& execution);
+    std::vector<std::int32_t> elementsOf(const DepthKey& key, const ElementIndex& index) const;
     std::vector<PlannedBrick> children(const PlannedBrick& brick) const;
     void splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick>& made) const;
 
     const TetMesh* mesh_;
     PlanFrame frame_;
+    BrickRange rootRange_;  // that the mesh and the bounds leave
     GrowingTree tree_;
     std::vector<PlannedBrick> bricks_;  // by the slots of tree_; empty ones at free slots
 };

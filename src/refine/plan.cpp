@@ -163,7 +163,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
     std::vector<float> sizes = elementSizes(mesh, frame.rootSpacingWorld, options.boundsWorld, execution);
     if (options.boundsWorld && !hasFinestSpacing(options) && options.maxLevels == 0)
         coarsenRoot(frame, sizes, options.samplesPerElement);
-    BrickPlan plan(mesh, frame, execution);
+    BrickPlan plan(mesh, frame, execution, builtIndex(options));
     if (plan.leafCount() > maxLeaves)
         throw InputError("the coarsest plan has " + std::to_string(plan.leafCount() * brickPoints) +
                          " voxels, more than " + budgetText(options, maxLeaves) +
@@ -203,7 +203,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
 
 BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,
                      int channels, std::vector<std::string>* notes) {
-    const Box3d meshBox = meshBounds(mesh, execution);
+    const Box3d meshBox = meshBounds(mesh, execution, builtIndex(options));
     checkOptions(mesh, meshBox, options);
     TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");
     execution.report(Stage::planning, 0, 1);

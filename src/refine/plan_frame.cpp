@@ -54,7 +54,8 @@ double finestSpacing(const RefineOptions& options, double longest) {
 
 }  // namespace
 
-Box3d meshBounds(const TetMesh& mesh, const Execution& execution) {
+Box3d meshBounds(const TetMesh& mesh, const Execution& execution, const ElementIndex* index) {
+    if (index) return index->boundsWorld();
     constexpr std::int64_t kChunk = 16384;
     const std::vector<std::uint8_t> used = usedNodes(mesh, execution);
     std::vector<Box3d> parts(std::size_t((mesh.nodeCount() + kChunk - 1) / kChunk));

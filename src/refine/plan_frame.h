@@ -9,8 +9,13 @@ namespace tessera {
 /// or extent.
 void checkOptions(const TetMesh& mesh, const Box3d& meshBoundsWorld, const RefineOptions& options);
 
-/// mesh.boundsWorld(), on all threads.
-Box3d meshBounds(const TetMesh& mesh, const Execution& execution);
+/// mesh.boundsWorld(), on all threads; of the index, where there is one.
+Box3d meshBounds(const TetMesh& mesh, const Execution& execution, const ElementIndex* index = nullptr);
+
+/// The index that the options share, where it is built already; else null.
+inline const ElementIndex* builtIndex(const RefineOptions& options) {
+    return options.bind.index ? options.bind.index->ifBuilt() : nullptr;
+}
 
 /// True when the user fixed the finest spacing.
 inline bool hasFinestSpacing(const RefineOptions& options) {

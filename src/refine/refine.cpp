@@ -121,7 +121,8 @@ class ErrorRefinement {
           samples_(mesh, fields, execution),
           nearest_(mesh, execution.threads),
           bounds_(errorBounds(mesh, fields, samples_, options)),
-          plan_(mesh, chooseFrame(meshBounds(mesh, execution), options), execution) {
+          plan_(mesh, chooseFrame(meshBounds(mesh, execution, builtIndex(options)), options), execution,
+                builtIndex(options)) {
         plan_.placeOfSample = [this](std::uint32_t sample) {
             return samples_.placeWorld(sample, plan_.frame().originWorld);
         };
@@ -440,7 +441,7 @@ BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, 
     Timer timer;
     if (options.criterion == Criterion::error) {
         execution.report(Stage::planning, 0, 1);
-        checkOptions(mesh, meshBounds(mesh, execution), options);
+        checkOptions(mesh, meshBounds(mesh, execution, builtIndex(options)), options);
         ErrorRefinement refinement(mesh, fields, resampler, options, execution);
         const double setupMs = timer.elapsedMs();
         BrickResult result = refinement.run();

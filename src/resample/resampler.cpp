@@ -2,6 +2,8 @@
 
 #include "tessera/lattice.h"
 
+#include "resample/device_slots.h"
+
 namespace tessera {
 
 std::string_view nameOf(SampleFormat format) {
@@ -16,6 +18,12 @@ std::string_view nameOf(SampleFormat format) {
             return "r8";
     }
     return "unknown";
+}
+
+ResampleStatistics BoundResampler::resampleToDevice(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                                    DeviceSlots& slots, const Execution& execution) {
+    return resample(
+        lattice, boxes, [&](std::size_t box, const Block& block) { slots.upload(box, block); }, execution);
 }
 
 Block resampleBlock(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,

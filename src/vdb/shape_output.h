@@ -21,8 +21,8 @@ struct OutputShape {
     int layers = 0;          ///< of the extension outside the mesh
     bool halfFloat = false;  ///< round values to half floats where those can hold a grid
     std::optional<Box3d> boundsWorld;
-    std::int64_t maxFlatVoxels =
-        0;  ///< flat: bound on points; 0: 2^26, or none when the bricks have one level
+    /// flat: bound on points; 0: 2^26, or none when the bricks have one level
+    std::int64_t maxFlatVoxels = 0;
     std::int64_t maxFlatBytes = 0;  ///< flat: bound on the grids' memory; 0: a quarter of the machine's
 };
 

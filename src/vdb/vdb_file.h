@@ -35,10 +35,10 @@ struct VdbWriteOptions {
     bool halfFloat = false;
     float background = 0;
     UpAxis upAxis = UpAxis::keep;
-    double unitScale =
-        0;  ///< file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
-    double voxelShift =
-        0;  ///< the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
+    /// file units per world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB
+    double unitScale = 0;
+    /// the file's transforms place voxel i where lattice point i + voxelShift is, on each axis
+    double voxelShift = 0;
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
     std::optional<float> hiddenValue;  ///< .vti: of points that nothing is stored for; see writeVti
@@ -60,8 +60,8 @@ struct VdbWriteResult {
 
 /// A file read back.
 struct VdbFile {
-    BrickTree
-        tree;  ///< of the store: the bricks, or in the flat layout the grid cut into bricks of one level
+    /// of the store: the bricks, or in the flat layout the grid cut into bricks of one level
+    BrickTree tree;
     BrickStore store;                 ///< samples and extension
     std::optional<BrickTree> bricks;  ///< flat: the bricks that the grid was made of
     std::vector<OutputField> fields;
