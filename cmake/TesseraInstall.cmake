@@ -1,18 +1,16 @@
-# `cmake --install`: headers under include/tessera/<layer>/, static libraries, the command line and package files, so that another project can say
-# find_package(Tessera) and link Tessera::refine, Tessera::io, ...
+# `cmake --install`: the public headers under include/tessera/, static libraries, the command line and package files, so that another project can
+# say find_package(Tessera) and link Tessera::tessera. Other targets in the package are what that one is made of.
 include(CMakePackageConfigHelpers)
 
 set(TESSERA_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/Tessera)
 get_property(layers GLOBAL PROPERTY TESSERA_LAYERS)
 foreach(layer IN LISTS layers)
   install(TARGETS tessera_${layer} EXPORT TesseraTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/${layer} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/tessera
-    FILES_MATCHING PATTERN "*.h")
 endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/tessera DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 if(TARGET tessera)
-  install(TARGETS tessera EXPORT TesseraTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-  install(TARGETS tessera_read_mesh EXPORT TesseraTargets RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/tessera)
+  install(TARGETS tessera RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS tessera_read_mesh RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/tessera)
 endif()
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

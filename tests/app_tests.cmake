@@ -28,7 +28,7 @@ if(TARGET tessera)
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/external/check_against_vtk.py --tessera $<TARGET_FILE:tessera>
               ${PROJECT_SOURCE_DIR}/data ${PROJECT_SOURCE_DIR}/../shared/data)
     add_test(NAME install_test
-      COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/install_test.sh ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
+      COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/install_test.py ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
   endif()
 endif()
 

@@ -63,8 +63,6 @@ def check_includes(rows, problems):
             continue
         allowed = closure(rows, name)
         for path in source_files(folder):
-            if "consumer" in path.parts:  # a project of its own
-                continue
             checked += 1
             for include in re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(), re.M):
                 top = public.get(include, include.split("/")[0])

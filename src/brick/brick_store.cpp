@@ -1,5 +1,6 @@
 #include "brick/brick_store.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "base/check.h"
@@ -58,6 +59,23 @@ std::size_t tileOf(const Vec3i& local, int tilesPerEdge) {
 }
 
 }  // namespace
+
+BrickStore::BrickStore(const BrickStore& other)
+    : channels_(other.channels_),
+      tilesPerEdge_(other.tilesPerEdge_),
+      tileCount_(other.tileCount_),
+      leafCount_(other.leafCount_),
+      tiles_(other.tiles_.size()) {
+    const auto values = std::size_t(channels_) * kTilePoints;
+    const auto copyOf = [&](const Tile& tile) {
+        Tile copy{tile.coverage, std::make_unique_for_overwrite<float[]>(values)};
+        std::copy_n(tile.values.get(), values, copy.values.get());
+        return copy;
+    };
+    for (std::size_t t = 0; t < tiles_.size(); ++t)
+        if (other.tiles_[t]) tiles_[t] = std::make_unique<Tile>(copyOf(*other.tiles_[t]));
+    for (const auto& [key, tile] : other.extension_) extension_.emplace(key, copyOf(tile));
+}
 
 BrickStore::BrickStore(int brickCells, std::size_t leafCount, int channels)
     : channels_(channels),

@@ -54,6 +54,10 @@ class BrickStore {
   public:
     BrickStore() = default;
     BrickStore(int brickCells, std::size_t leafCount, int channels);
+    /// Copies all samples, which takes their memory once more: never by chance.
+    explicit BrickStore(const BrickStore& other);
+    BrickStore(BrickStore&&) = default;
+    BrickStore& operator=(BrickStore&&) = default;
 
     int channels() const { return channels_; }
     int tilesPerEdge() const { return tilesPerEdge_; }

@@ -4,17 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "tessera/criterion.h"
+#include "tessera/options.h"
 #include "tessera/resampler.h"
 #include "tessera/vec.h"
 
 namespace tessera {
-
-/// A frame that the plan must use: the lattice of another file, or of the first step of a time series.
-struct FixedFrame {
-    Vec3d originWorld{0};
-    double spacingWorld = 1;  ///< h_0
-};
 
 struct RefineOptions {
     Criterion criterion = Criterion::elementSize;

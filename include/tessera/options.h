@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tessera/vec.h"
+
+namespace tessera {
+
+/// What decides how fine bricks are.
+enum class Criterion {
+    /// One spacing everywhere: `resolution` or `spacingWorld`.
+    uniform,
+    /// `samplesPerElement` along the edges of the elements that are there.
+    elementSize,
+    /// Bricks are halved until the measured error is within `maxError`.
+    error
+};
+
+/// Which error a bound holds for: the largest of all, or the root of the mean square over the mesh's volume.
+enum class ErrorMeasure { max, rms };
+
+/// A lattice that bricks must lie on: that of another result, or of the first step of a time series.
+struct FixedFrame {
+    /// The place of lattice point (0, 0, 0), world units.
+    Vec3d originWorld{0};
+    /// Of level 0, the finest, world units.
+    double spacingWorld = 1;
+};
+
+/// What to make of a mesh.
+struct BrickOptions {
+    /// A name that registry.h knows; "auto": the fastest that this machine has.
+    std::string algorithm = "software";
+    /// Of an algorithm with several: one of Resampler::targets(); empty: the first.
+    std::string target;
+    /// Names of fields; "point:T" and "cell:T" tell two of one name apart. Empty: all.
+    std::vector<std::string> fields;
+
+    Criterion criterion = Criterion::elementSize;
+    /// The finest spacing as a number of lattice points along the longest axis of the bounds, at least 2; 0:
+    /// not given.
+    int resolution = 0;
+    /// The finest spacing, world units; 0: not given. Not beside `resolution`.
+    double spacingWorld = 0;
+    /// elementSize: lattice points along a typical element edge.
+    double samplesPerElement = 2;
+    /// Nested levels at most; 0: 8 for elementSize, no bound for error.
+    int maxLevels = 0;
+
+    /// error: the bound, as a share of each field's range or in the field's unit.
+    double maxError = 0;
+    bool maxErrorIsRelative = true;
+    ErrorMeasure errorMeasure = ErrorMeasure::max;
+    /// Names of the fields that the bound holds for; empty: all point fields chosen.
+    std::vector<std::string> errorFields;
+
+    /// Cells along a brick's edge: 8, 16, 32 or 64.
+    int brickCells = 16;
+    /// Bound on stored points; 0: one from the memory there is.
+    std::int64_t maxVoxels = 0;
+    /// Bound on the samples' memory, bytes; 0: none of its own.
+    std::int64_t maxMemoryBytes = 0;
+    /// Keeps only the points that reading inside this box needs, world units.
+    std::optional<Box3d> boundsWorld;
+    /// In place of `resolution` and `spacingWorld`.
+    std::optional<FixedFrame> frame;
+};
+
+}  // namespace tessera

@@ -1,0 +1,101 @@
+#include "tessera/read.h"
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "mesh_files/mesh_series.h"
+#include "reader/isolated_reader.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+std::string& knownProgram() {
+    static std::string path;
+    return path;
+}
+
+bool isProgram(const std::string& path) {
+    std::error_code error;
+    return std::filesystem::is_regular_file(path, error) && ::access(path.c_str(), X_OK) == 0;
+}
+
+std::string programInPath() {
+    const char* folders = std::getenv("PATH");
+    std::string_view rest = folders ? folders : "";
+    while (!rest.empty()) {
+        const std::string_view folder = rest.substr(0, rest.find(':'));
+        rest.remove_prefix(std::min(rest.size(), folder.size() + 1));
+        const std::string path = std::string(folder.empty() ? "." : folder) + "/tessera";
+        if (isProgram(path)) return path;
+    }
+    return {};
+}
+
+IsolatedReader findReader(const std::string& given) {
+    std::string program = given;
+    if (program.empty() && isProgram(knownProgram())) program = knownProgram();
+    if (program.empty()) program = programInPath();
+    if (program.empty())
+        throw IoError(
+            "the program tessera, which reads meshes in a separate process, was not found beside the library "
+            "nor in PATH: name it in InputOptions::program, or read in this process by isIsolated = false");
+    if (!isProgram(program)) throw IoError(program + " is no program that can be run; it is to read meshes");
+    return {program, {"read-mesh"}, quickReaderBeside(program)};
+}
+
+InputMesh readFiles(const std::vector<std::string>& files, int step, const InputOptions& options,
+                    const Execution& execution) {
+    if (files.empty()) throw InputError("a step without a file can't be read");
+    const ReadOptions read{options.fields, step, {files.begin() + 1, files.end()}};
+    execution.report(Stage::reading, 0, 1);
+    IsolationLimits limits;
+    limits.memoryBytes = options.maxMemoryBytes;
+    limits.seconds = options.maxSeconds;
+    if (limits.memoryBytes < 0 || !(limits.seconds >= 0))
+        throw InputError("bounds on the reading of a mesh must not be negative");
+    MeshFile file = options.isIsolated
+                        ? readMeshIsolated(findReader(options.program), files[0], read, limits, execution)
+                        : readMesh(files[0], read, execution);
+    return {std::move(file.mesh), std::filesystem::path(files[0]).filename().string(), std::nullopt,
+            std::move(file.statistics.warnings)};
+}
+
+}  // namespace
+
+void useProgram(const char* path) {
+    knownProgram() = path;
+}
+
+InputMesh read(const InputStep& step, const InputOptions& options, const Execution& execution) {
+    InputMesh input = readFiles(step.files, options.step, options, execution);
+    input.time = step.time;
+    // The parts of a mesh have the name of the file that lists them.
+    if (step.files.size() > 1) input.sourceFile = std::filesystem::path(step.collection).filename().string();
+    return input;
+}
+
+InputMesh read(const std::string& path, const InputOptions& options, const Execution& execution) {
+    if (!isCollectionName(path)) return readFiles({path}, options.step, options, execution);
+    const std::vector<InputStep> steps = listSteps({path});
+    if (options.step >= int(steps.size()))
+        throw InputError(path + ": there is no time step " + std::to_string(options.step) + "; it has " +
+                         std::to_string(steps.size()) + ", counted from 0");
+    InputOptions ofFile = options;
+    ofFile.step = -1;
+    return read(options.step < 0 ? steps.back() : steps[std::size_t(options.step)], ofFile, execution);
+}
+
+std::vector<InputStep> listSteps(const std::vector<std::string>& inputs) {
+    std::vector<InputStep> steps;
+    for (SeriesStep& step : listSeries(inputs))
+        steps.push_back({std::move(step.files), std::move(step.collection), step.time});
+    return steps;
+}
+
+}  // namespace tessera
