@@ -15,7 +15,7 @@ struct SamplerOptions {
     /// A name that registry.h knows; "auto": the fastest that this machine has.
     std::string algorithm = "software";
     /// Names of fields; "point:T" and "cell:T" tell two of one name apart. Empty: all.
-    std::vector<std::string> fields;
+    std::vector<std::string> fields{};
 };
 
 /// Samples single bricks of a mesh, wherever and as fine as they are asked for. The first call builds an

@@ -35,9 +35,9 @@ struct BrickOptions {
     /// A name that registry.h knows; "auto": the fastest that this machine has.
     std::string algorithm = "software";
     /// Of an algorithm with several: one of Resampler::targets(); empty: the first.
-    std::string target;
+    std::string target{};
     /// Names of fields; "point:T" and "cell:T" tell two of one name apart. Empty: all.
-    std::vector<std::string> fields;
+    std::vector<std::string> fields{};
 
     Criterion criterion = Criterion::elementSize;
     /// The finest spacing as a number of lattice points along the longest axis of the bounds, at least 2; 0:
@@ -55,7 +55,7 @@ struct BrickOptions {
     bool maxErrorIsRelative = true;
     ErrorMeasure errorMeasure = ErrorMeasure::max;
     /// Names of the fields that the bound holds for; empty: all point fields chosen.
-    std::vector<std::string> errorFields;
+    std::vector<std::string> errorFields{};
 
     /// Cells along a brick's edge: 8, 16, 32 or 64.
     int brickCells = 16;
@@ -64,9 +64,9 @@ struct BrickOptions {
     /// Bound on the samples' memory, bytes; 0: none of its own.
     std::int64_t maxMemoryBytes = 0;
     /// Keeps only the points that reading inside this box needs, world units.
-    std::optional<Box3d> boundsWorld;
+    std::optional<Box3d> boundsWorld{};
     /// In place of `resolution` and `spacingWorld`.
-    std::optional<FixedFrame> frame;
+    std::optional<FixedFrame> frame{};
 };
 
 }  // namespace tessera

@@ -13,7 +13,7 @@ namespace tessera {
 /// How to read a mesh.
 struct InputOptions {
     /// Names of the fields to read; "point:T" and "cell:T" tell two of one name apart. Empty: all.
-    std::vector<std::string> fields;
+    std::vector<std::string> fields{};
     /// Of files with several steps, and of .pvd files: which one, counted from 0; -1: the last.
     int step = -1;
     /// Meshes are read in a separate process, so that a damaged file costs an error and no crash. False: in
@@ -21,7 +21,7 @@ struct InputOptions {
     bool isIsolated = true;
     /// The installed program `tessera`, which is that process. Empty: the one beside the library that this
     /// program was linked with by Tessera's CMake package, or else the one in PATH.
-    std::string program;
+    std::string program{};
     /// Bounds on that process, bytes and seconds; 0: by the size of the file.
     std::int64_t maxMemoryBytes = 0;
     double maxSeconds = 0;

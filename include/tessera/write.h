@@ -29,18 +29,18 @@ struct OutputOptions {
     FileLayout layout = FileLayout::automatic;
     /// Layers of voxels outside the mesh, so that programs that interpolate see all of it; not given: 1 for
     /// flat, 0 for levels.
-    std::optional<int> extend;
+    std::optional<int> extend{};
     /// 16-bit floats where they can hold a grid's values.
     bool isHalf = false;
     /// The value of voxels that are not stored; not given: 0.
-    std::optional<float> background;
+    std::optional<float> background{};
     FileAxes axes = FileAxes::asMesh;
     /// File units for each world unit; 0: 1, or a power of ten when voxels would be too small for OpenVDB.
     double unitScale = 0;
     /// The file places voxel i where lattice point i + voxelShift is, on each axis.
     double voxelShift = 0;
     /// A field's name -> its name in the file; others keep theirs.
-    std::map<std::string, std::string> names;
+    std::map<std::string, std::string> names{};
 };
 
 /// What was written.
