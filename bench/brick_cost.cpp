@@ -20,12 +20,15 @@
 
 #include "base/timer.h"
 #include "bench_statistics.h"
+#include "mesh/element_index.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 #include "reference/random.h"
-#include "registry/registry.h"
+#include "resample/statistic_names.h"
 #include "resample/stoppable_sampling.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 namespace {
 

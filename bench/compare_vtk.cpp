@@ -18,7 +18,7 @@
 #include "refine/brick_result.h"
 #include "refine/refine.h"
 #include "refine/refine_options.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 #include "vtk_resample.h"
 
 namespace {

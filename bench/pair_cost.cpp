@@ -23,7 +23,9 @@
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_mesh.h"
-#include "registry/registry.h"
+#include "resample/statistic_names.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 namespace {
 

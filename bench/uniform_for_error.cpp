@@ -14,12 +14,13 @@
 #include <limits>
 #include <vector>
 
-#include "base/error.h"
-#include "base/execution.h"
+#include "base/parallel.h"
 #include "mesh/element_index.h"
 #include "mesh/nearest_point.h"
 #include "mesh_files/read_mesh.h"
 #include "refine/error_samples.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 namespace {

@@ -20,7 +20,8 @@ function(tessera_layer name)
   set_target_properties(tessera_${name} PROPERTIES EXPORT_NAME ${name})
   target_compile_features(tessera_${name} PUBLIC cxx_std_20)
   target_include_directories(tessera_${name} PUBLIC
-    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tessera>)
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/tessera>)
   foreach(layer IN LISTS ARG_LINK)
     target_link_libraries(tessera_${name} PUBLIC tessera_${layer})
   endforeach()

@@ -6,10 +6,13 @@
 #include <thread>
 #include <vector>
 
-#include "base/error.h"
-#include "base/execution.h"
+#include "base/check.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "base/timer.h"
-#include "base/vec.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 namespace {

@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "base/error.h"
 #include "brick/growing_tree.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <random>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -1,8 +1,9 @@
 #include "brick/brick_tree.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

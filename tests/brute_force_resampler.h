@@ -6,7 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "resample/resampler.h"
+#include "base/parallel.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -1,4 +1,6 @@
 #include "compare/compare_resamplers.h"
+#include "resample/statistic_names.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +8,10 @@
 #include <functional>
 #include <memory>
 
-#include "base/error.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
-#include "registry/registry.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {

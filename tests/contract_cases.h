@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "lattice/lattice.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 // The meshes, lattices and fields of the contract suite.
 

@@ -7,10 +7,12 @@
 #include <limits>
 
 #include "contract_suite.h"
+#include "mesh/field_range.h"
 #include "oracle_resampler.h"
 #include "reference/check_contract.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
+#include "tessera/lattice.h"
 
 namespace tessera::contract {
 namespace {

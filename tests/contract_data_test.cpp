@@ -11,7 +11,7 @@
 #include "contract_suite.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace tessera::contract {
 namespace {

@@ -7,12 +7,14 @@
 #include <limits>
 
 #include "contract_suite.h"
+#include "mesh/field_range.h"
 #include "oracle_resampler.h"
 #include "quantised_resampler.h"
 #include "reference/fields.h"
 #include "reference/format_allowance.h"
 #include "reference/generators.h"
 #include "software/software_resampler.h"
+#include "tessera/lattice.h"
 
 namespace tessera::contract {
 namespace {

@@ -9,7 +9,7 @@
 #include "contract_suite.h"
 #include "reference/generators.h"
 #include "reference/random.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace tessera::contract {
 namespace {

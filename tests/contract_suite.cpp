@@ -12,6 +12,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/parallel.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 

@@ -7,7 +7,8 @@
 
 #include "contract_cases.h"
 #include "reference/check_contract.h"
-#include "resample/resampler.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 // What the contract tests share: who is tested, and the checks of one subject on one mesh and lattice.
 

@@ -5,12 +5,13 @@
 #include <cstdlib>
 #include <set>
 
-#include "base/error.h"
 #include "contract_suite.h"
 #include "oracle_resampler.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
-#include "registry/registry.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 namespace tessera::contract {
 namespace {

@@ -1,4 +1,5 @@
 #include "resample/cut_plane.h"
+#include "resample/statistic_names.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +7,10 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "base/error.h"
 #include "reference/generators.h"
 #include "reference/random.h"
-#include "registry/registry.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {

@@ -1,4 +1,6 @@
 #include "device/device_samples.h"
+#include "resample/statistic_names.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +8,6 @@
 #include <cstdint>
 #include <numeric>
 
-#include "base/error.h"
 #include "gl/gl_platform.h"
 #include "gl_test_tools.h"
 #include "hybrid/hybrid_resampler.h"
@@ -14,6 +15,7 @@
 #include "reference/generators.h"
 #include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -10,11 +10,11 @@
 #include <numeric>
 #include <thread>
 
-#include "base/error.h"
 #include "gl/gl_program.h"
 #include "gl/gl_thread.h"
 #include "gl_test/shaders.h"
 #include "gl_test_tools.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

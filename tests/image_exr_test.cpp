@@ -22,11 +22,11 @@
 #include <map>
 #include <set>
 
-#include "base/error.h"
 #include "mesh_test_tools.h"
 #include "reference/generators.h"
-#include "registry/registry.h"
 #include "resample/cut_plane.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {

@@ -9,10 +9,10 @@
 #include <filesystem>
 #include <limits>
 
-#include "base/error.h"
 #include "base/text.h"
 #include "pictures/bitmap_font.h"
 #include "pictures/sample_slice.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -15,13 +15,13 @@
 #include <fstream>
 #include <thread>
 
-#include "base/error.h"
 #include "files/input_file.h"
 #include "mesh_test_tools.h"
 #include "reader/mesh_packet.h"
 #include "reader/reader_limits.h"
 #include "reader/reader_report.h"
 #include "reader/serve_mesh_reader.h"
+#include "tessera/error.h"
 #include "vtu_text.h"
 
 namespace tessera {

@@ -33,7 +33,25 @@ def source_files(folder):
     return sorted(p for ext in ("*.h", "*.cpp") for p in folder.rglob(ext))
 
 
+def public_headers():
+    """Name of a public header as it is included -> the room it belongs to: that with the source of its name, or base."""
+    rooms = {}
+    for path in sorted((ROOT / "include/tessera").iterdir()):
+        sources = [p for p in (ROOT / "src").glob("*/" + path.stem + ".cpp") if not p.with_suffix(".h").is_file()]
+        rooms[f"tessera/{path.name}"] = sources[0].parent.name if sources else "base"
+    return rooms
+
+
+def check_public_headers(problems):
+    """They include one another, the standard library and GLM, and nothing else."""
+    for path in source_files(ROOT / "include"):
+        for include in re.findall(r"^\s*#\s*include\s*(.*)$", path.read_text(), re.M):
+            if not re.match(r'"tessera/\w+\.h"$|<[a-z_0-9]+>$|<glm/[\w/]+\.hpp>$', include):
+                problems.append(f"{path.relative_to(ROOT)} includes {include}")
+
+
 def check_includes(rows, problems):
+    public = public_headers()
     layers = {p.name for p in (ROOT / "src").iterdir() if p.is_dir()}
     for missing in sorted(layers - set(rows)):
         problems.append(f"src/{missing}/ has no row in docs/architecture.md")
@@ -49,7 +67,7 @@ def check_includes(rows, problems):
                 continue
             checked += 1
             for include in re.findall(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', path.read_text(), re.M):
-                top = include.split("/")[0]
+                top = public.get(include, include.split("/")[0])
                 if "/" in include and top in layers and top not in allowed:
                     problems.append(f"{path.relative_to(ROOT)} includes {include}: {name} may not include {top}")
     return checked
@@ -94,9 +112,9 @@ def check_heavy(problems):
 def check_headers(problems):
     """Every source file of a room has the header of its name, and no header includes itself through others."""
     includes = {}
-    for path in source_files(ROOT / "src"):
-        name = str(path.relative_to(ROOT / "src"))
-        if path.suffix == ".cpp" and not path.with_suffix(".h").is_file():
+    for path in source_files(ROOT / "src") + source_files(ROOT / "include"):
+        name = str(path.relative_to(ROOT / path.relative_to(ROOT).parts[0]))
+        if path.suffix == ".cpp" and not any(p.with_suffix(".h").is_file() for p in (path, ROOT / "include/tessera" / path.name)):
             problems.append(f"src/{name} has no header of its name")
         if path.suffix == ".h":
             includes[name] = re.findall(r'^#include "([^"]+)"', path.read_text(), re.M)
@@ -123,6 +141,7 @@ def main():
         checked = check_includes(rows, problems)
         if checked < 20:
             problems.append(f"only {checked} source files found")
+        check_public_headers(problems)
         check_links(rows, problems)
         check_heavy(problems)
         check_headers(problems)

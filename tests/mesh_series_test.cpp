@@ -1,12 +1,13 @@
 #include "mesh_files/mesh_series.h"
+#include "mesh/field_range.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "base/error.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
+#include "tessera/error.h"
 #include "vtu_text.h"
 
 namespace tessera {

@@ -12,7 +12,7 @@
 #include <unistd.h>
 
 #include "mesh/geometry.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera::test {
 

@@ -19,11 +19,11 @@
 #include <thread>
 #include <vector>
 
-#include "base/error.h"
 #include "reader/isolated_reader.h"
 #include "reader/reader_process.h"
 #include "reader/reader_report.h"
 #include "reader/serve_mesh_reader.h"
+#include "tessera/error.h"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include <atomic>
 #include <map>
 
-#include "base/error.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb/vdb_write.h"
 #include "vdb_case.h"
 

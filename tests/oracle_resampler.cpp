@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "reference/reference_block.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera::contract {
 

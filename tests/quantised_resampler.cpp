@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "mesh/field_range.h"
+#include "tessera/lattice.h"
+
 namespace tessera::contract {
 
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 namespace tessera::contract {
 

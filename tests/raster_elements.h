@@ -9,9 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
 #include "raster/prepared_region.h"
 #include "reference/random.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 // Random elements that are hard on rasterisers, for the tests of the OpenGL resamplers' core. They have
 // nothing to do with one another: each is a mesh of its own in the same list.

@@ -8,9 +8,11 @@
 #include <limits>
 #include <map>
 
+#include "base/floor_div.h"
 #include "raster/channel_coding.h"
 #include "raster/regions.h"
 #include "reference/random.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 namespace {

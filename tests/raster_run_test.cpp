@@ -5,12 +5,14 @@
 #include <future>
 #include <thread>
 
-#include "base/error.h"
 #include "hybrid/slice_polygon_generator.h"
 #include "raster/hard_elements.h"
 #include "raster/regions.h"
 #include "raster_run_tools.h"
+#include "resample/statistic_names.h"
 #include "slicing/silhouette_generator.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 namespace {

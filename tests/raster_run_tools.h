@@ -17,7 +17,8 @@
 #include "raster/raster_device.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
-#include "registry/registry.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 // What the tests of running OpenGL resamplers share.
 

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <optional>
 
-#include "base/error.h"
 #include "raster_run_tools.h"
+#include "resample/statistic_names.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 namespace {

@@ -5,10 +5,10 @@
 #include <fstream>
 #include <sstream>
 
-#include "base/error.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 #include "reference/random.h"
+#include "tessera/error.h"
 #include "vtu_text.h"
 
 #ifdef __SANITIZE_ADDRESS__

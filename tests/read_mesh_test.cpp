@@ -4,10 +4,11 @@
 #include <filesystem>
 #include <set>
 
-#include "base/error.h"
+#include "mesh/field_range.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_files/write_tets.h"
 #include "mesh_test_tools.h"
+#include "tessera/error.h"
 #include "vtu_text.h"
 
 namespace tessera {

@@ -1,14 +1,15 @@
 #include "refine/refine.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
 #include "brick_test_meshes.h"
 #include "brute_force_resampler.h"
 #include "refine/brick_result.h"
 #include "refine/plan.h"
 #include "refine/refine_options.h"
 #include "refine/resample_tree.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

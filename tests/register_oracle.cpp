@@ -1,7 +1,7 @@
 // Adds the oracle to the algorithms of the program that this is linked into.
 
 #include "oracle_resampler.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace {
 

@@ -1,10 +1,10 @@
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -1,4 +1,5 @@
 #include "mesh/repair.h"
+#include "mesh/field_range.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>
@@ -10,12 +11,12 @@
 #include <map>
 #include <sstream>
 
-#include "base/error.h"
 #include "mesh/flat_elements.h"
 #include "mesh/mesh_quality.h"
 #include "reference/fields.h"
 #include "reference/random.h"
 #include "repair_test_meshes.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
 #include "mesh_test_tools.h"
 #include "reference/generators.h"
+#include "tessera/mesh.h"
 
 // Good meshes of a box with degenerate elements of one class inside. All conform, all are positively
 // oriented.

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <random>
 
-#include "base/error.h"
 #include "index_space/element_bins.h"
 #include "index_space/element_depth.h"
 #include "index_space/node_frame.h"
-#include "registry/registry.h"
+#include "resample/statistic_names.h"
 #include "software/software_resampler.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {

@@ -13,10 +13,11 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
+#include "mesh/field_range.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 #include "reader/isolated_reader.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

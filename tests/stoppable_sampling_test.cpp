@@ -1,14 +1,17 @@
 #include "resample/stoppable_sampling.h"
+#include "mesh/element_index.h"
+#include "resample/statistic_names.h"
+#include "tessera/lattice.h"
 
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <numeric>
 
-#include "base/error.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
-#include "registry/registry.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {

@@ -13,7 +13,9 @@
 #include <iterator>
 #include <limits>
 
+#include "base/floor_div.h"
 #include "refine/brick_result.h"
+#include "tessera/lattice.h"
 #include "vdb/openvdb_grids.h"
 #include "vdb/vdb_file.h"
 

@@ -1,9 +1,9 @@
 #include <atomic>
 
-#include "base/error.h"
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
+#include "tessera/error.h"
 #include "vdb/vdb_file.h"
 #include "vdb/vdb_metadata.h"
 #include "vdb/vdb_read.h"

@@ -1,12 +1,13 @@
 #include "vdb/vdb_file.h"
+#include "tessera/lattice.h"
 #include "vdb/shape_output.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
-#include "base/error.h"
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
+#include "tessera/error.h"
 #include "vdb/vdb_read.h"
 #include "vdb/vdb_write.h"
 #include "vdb_case.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "tessera/error.h"
 #include "vdb/report_json.h"
 
 namespace tessera {

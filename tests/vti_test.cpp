@@ -1,3 +1,4 @@
+#include "base/floor_div.h"
 #include "vdb/vti_write.h"
 
 #include <vtkCellData.h>
@@ -12,8 +13,8 @@
 
 #include <atomic>
 
-#include "base/error.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb_case.h"
 
 namespace tessera {

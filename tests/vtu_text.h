@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "base/vec.h"
+#include "tessera/vec.h"
 
 namespace tessera::test {
 

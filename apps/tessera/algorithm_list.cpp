@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "base/error.h"
-#include "registry/registry.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 

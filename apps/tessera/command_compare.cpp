@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "algorithm_list.h"
-#include "base/error.h"
 #include "commands.h"
 #include "compare_text.h"
 #include "field_selection.h"

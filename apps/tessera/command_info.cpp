@@ -3,7 +3,6 @@
 #include <bit>
 #include <filesystem>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "gl_report.h"
@@ -11,6 +10,7 @@
 #include "output_paths.h"
 #include "report_text.h"
 #include "series_steps.h"
+#include "tessera/error.h"
 #include "vdb/vdb_file.h"
 #include "vdb/vdb_read.h"
 

@@ -7,10 +7,10 @@
 #include <limits>
 #include <sstream>
 
-#include "base/error.h"
 #include "program_presets.h"
 #include "resample/cut_plane.h"
 #include "terminal.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "algorithm_list.h"
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "compare/run_times.h"
@@ -17,8 +16,11 @@
 #include "mesh_files/read_mesh.h"
 #include "output_paths.h"
 #include "paper_figures.h"
-#include "registry/registry.h"
 #include "report_text.h"
+#include "resample/statistic_names.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 

@@ -7,15 +7,16 @@
 #include <numeric>
 #include <utility>
 
-#include "base/error.h"
 #include "commands.h"
 #include "files/atomic_file.h"
 #include "import_mesh.h"
+#include "mesh/field_range.h"
 #include "output_paths.h"
 #include "pictures/image.h"
 #include "pictures/sample_slice.h"
-#include "registry/registry.h"
 #include "report_text.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 #include "vdb/vdb_file.h"
 #include "vdb/vdb_read.h"
 

@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <map>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "field_selection.h"
@@ -18,9 +17,10 @@
 #include "refine/plan.h"
 #include "refine/refine.h"
 #include "refine/refine_options.h"
-#include "registry/registry.h"
 #include "report_text.h"
 #include "series_steps.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 #include "vdb/shape_output.h"
 #include "vdb/vdb_metadata.h"
 #include "vdb/vdb_read.h"

@@ -6,18 +6,20 @@
 #include <limits>
 #include <set>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "field_selection.h"
 #include "files/atomic_file.h"
 #include "import_mesh.h"
+#include "mesh/field_range.h"
 #include "output_paths.h"
 #include "pictures/image.h"
 #include "pictures/image_exr.h"
-#include "registry/registry.h"
 #include "report_text.h"
 #include "resample/cut_plane.h"
+#include "resample/statistic_names.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 

@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "import_mesh.h"
 #include "mesh_files/mesh_series.h"
 #include "output_paths.h"
 #include "refine/measure_error.h"
-#include "registry/registry.h"
 #include "report_text.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
 #include "vdb/outside_reader.h"
 #include "vdb/vdb_file.h"
 #include "vdb/vdb_read.h"

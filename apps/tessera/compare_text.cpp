@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "report_text.h"
+#include "resample/statistic_names.h"
 
 namespace tessera {
 

@@ -6,8 +6,8 @@
 #include <numeric>
 #include <set>
 
-#include "base/error.h"
 #include "mesh_files/read_mesh.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

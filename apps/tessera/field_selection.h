@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
 #include "options.h"
+#include "tessera/mesh.h"
 #include "vdb/vdb_file.h"
 
 namespace tessera {

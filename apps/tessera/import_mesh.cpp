@@ -4,10 +4,11 @@
 
 #include <utility>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "files/json_parse.h"
+#include "mesh/field_range.h"
 #include "report_text.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
 #include "command_line.h"
 #include "files/atomic_file.h"
 #include "interrupt.h"
 #include "progress.h"
 #include "report_text.h"
+#include "tessera/error.h"
 
 namespace {
 

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "base/error.h"
 #include "report_text.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -8,10 +8,10 @@
 #include <limits>
 #include <set>
 
-#include "base/error.h"
 #include "files/atomic_file.h"
 #include "output_paths.h"
 #include "refine/refine_options.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

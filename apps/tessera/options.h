@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "base/vec.h"
 #include "refine/refine.h"
 #include "refine/refine_options.h"
+#include "tessera/vec.h"
 #include "vdb/output_formats.h"
 #include "vdb/shape_output.h"
 #include "vdb/vdb_file.h"

@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <map>
 
-#include "base/error.h"
 #include "files/atomic_file.h"
 #include "mesh_files/mesh_series.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 
 #include "refine/plan.h"
 #include "refine/refine.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

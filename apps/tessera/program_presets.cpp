@@ -6,7 +6,8 @@
 #include <array>
 #include <cctype>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "files/name_list.h"
+#include "mesh/field_range.h"
 #include "refine/plan.h"
 
 namespace tessera {

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 
-#include "base/error.h"
 #include "commands.h"
 #include "files/atomic_file.h"
 #include "refine/plan.h"

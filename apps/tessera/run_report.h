@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mesh/field_range.h"
 #include "mesh_files/read_mesh.h"
 #include "refine/plan.h"
 #include "refine/refine.h"

@@ -6,8 +6,9 @@
 #include <charconv>
 #include <cmath>
 
-#include "base/error.h"
+#include "mesh/field_range.h"
 #include "options.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <string>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "commands.h"
 #include "files/atomic_file.h"
@@ -18,6 +17,7 @@
 #include "report_text.h"
 #include "series_steps.h"
 #include "terminal.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

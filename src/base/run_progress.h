@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "base/execution.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "base/error.h"
+#include "base/check.h"
 
 namespace tessera {
 

@@ -8,8 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "base/floor_div.h"
 #include "brick/brick_tree.h"
-#include "lattice/block.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "base/error.h"
+#include "base/check.h"
 
 namespace tessera {
 

@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "lattice/lattice.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

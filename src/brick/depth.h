@@ -4,7 +4,7 @@
 #include <compare>
 #include <tuple>
 
-#include "base/vec.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -11,9 +11,12 @@
 #include <tuple>
 #include <unordered_set>
 
-#include "base/error.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "brick/leaf_tiles.h"
 #include "brick/overlap.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

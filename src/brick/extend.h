@@ -3,11 +3,11 @@
 #include <functional>
 #include <span>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/kept_points.h"
 #include "brick/seams.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -7,7 +7,8 @@
 #include <tuple>
 #include <vector>
 
-#include "base/error.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "brick/extend.h"
 #include "brick/kept_points.h"
 #include "brick/leaf_tiles.h"

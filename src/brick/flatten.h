@@ -5,11 +5,12 @@
 #include <optional>
 #include <span>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
 #include "brick/seams.h"
-#include "resample/resampler.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

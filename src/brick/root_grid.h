@@ -7,8 +7,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "base/error.h"
-#include "base/vec.h"
+#include "base/check.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/floor_div.h"
 
 namespace tessera {
 

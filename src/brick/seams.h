@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
 #include "mesh/nearest_point.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -4,8 +4,10 @@
 #include <memory>
 #include <utility>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "base/timer.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 #include "verify/voxel_mesh.h"
 
 namespace tessera {

@@ -8,7 +8,7 @@
 #include "compare/difference_meter.h"
 #include "compare/run_times.h"
 #include "compare/sampling_grid.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 #include "verify/point_checker.h"
 
 namespace tessera {

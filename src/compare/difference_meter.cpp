@@ -4,7 +4,8 @@
 #include <bit>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "mesh/field_range.h"
 
 namespace tessera {
 

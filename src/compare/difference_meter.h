@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "lattice/block.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "base/timer.h"
 
 namespace tessera {

@@ -2,10 +2,10 @@
 
 #include <span>
 
-#include "base/execution.h"
-#include "base/vec.h"
-#include "lattice/lattice.h"
-#include "resample/resampler.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

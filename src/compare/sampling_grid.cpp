@@ -4,7 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

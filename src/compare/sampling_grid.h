@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "base/vec.h"
-#include "lattice/lattice.h"
+#include "tessera/lattice.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "mesh/field_range.h"
 
 namespace tessera {
 
@@ -26,7 +27,8 @@ GLenum textureFormat(SampleFormat format, int channels) {
 
 TextureSlots::TextureSlots(GlThread& thread, std::vector<ValueCoding> codings, SampleFormat format)
     : thread_(thread), codings_(std::move(codings)), format_(format) {
-    for (const ValueCoding& coding : codings_) TESSERA_CHECK(coding.format() == format_, "a coding of another format");
+    for (const ValueCoding& coding : codings_)
+        TESSERA_CHECK(coding.format() == format_, "a coding of another format");
 }
 
 std::size_t TextureSlots::groupCount() const {

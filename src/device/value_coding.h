@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
-#include "mesh/tet_mesh.h"
-#include "resample/resampler.h"
+#include "mesh/field_range.h"
+#include "tessera/mesh.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

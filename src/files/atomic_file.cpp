@@ -14,7 +14,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

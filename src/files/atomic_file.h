@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/execution.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

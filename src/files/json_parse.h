@@ -6,7 +6,7 @@
 #include <string>
 #include <type_traits>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

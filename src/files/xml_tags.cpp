@@ -5,7 +5,7 @@
 #include <charconv>
 #include <cstdint>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

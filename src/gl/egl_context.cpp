@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "base/error.h"
 #include "gl/platform_context.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

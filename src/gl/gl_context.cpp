@@ -2,11 +2,12 @@
 
 #include <algorithm>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "gl/egl_context.h"
 #include "gl/gl_platform.h"
 #include "gl/osmesa_context.h"
 #include "gl/platform_context.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

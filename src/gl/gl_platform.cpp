@@ -5,8 +5,8 @@
 #include <mutex>
 #include <thread>
 
-#include "base/error.h"
 #include "gl/gl_context.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <set>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

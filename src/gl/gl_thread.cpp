@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "gl/gl_platform.h"
 
 namespace tessera {

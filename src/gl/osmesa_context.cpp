@@ -4,8 +4,8 @@
 
 #include <array>
 
-#include "base/error.h"
 #include "gl/platform_context.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

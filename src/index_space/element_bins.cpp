@@ -6,6 +6,8 @@
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
+
+#include "base/parallel.h"
 #endif
 
 namespace tessera {

@@ -4,9 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "index_space/node_frame.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "index_space/node_frame.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

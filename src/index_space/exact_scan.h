@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "base/vec.h"
 #include "index_space/element_depth.h"
 #include "index_space/node_frame.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "base/parallel.h"
+
 namespace tessera {
 
 namespace {

@@ -5,9 +5,9 @@
 #include <array>
 #include <vector>
 
-#include "base/execution.h"
-#include "lattice/lattice.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

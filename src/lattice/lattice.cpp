@@ -1,4 +1,4 @@
-#include "lattice/lattice.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

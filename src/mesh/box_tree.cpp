@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/parallel.h"
+
 namespace tessera {
 
 namespace {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "base/parallel.h"
 #include "mesh/geometry.h"
 
 namespace tessera {

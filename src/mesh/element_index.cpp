@@ -6,6 +6,8 @@
 #include <cstring>
 #include <limits>
 
+#include "base/parallel.h"
+
 namespace tessera {
 
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -7,7 +7,8 @@
 #include <memory>
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 
 namespace tessera {
 

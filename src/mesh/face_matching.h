@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "mesh/geometry.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -4,8 +4,9 @@
 
 #include <cmath>
 
-#include "base/execution.h"
+#include "base/parallel.h"
 #include "mesh/face_matching.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

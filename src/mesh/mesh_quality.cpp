@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/parallel.h"
 #include "mesh/box_tree.h"
 #include "mesh/face_matching.h"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/execution.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -3,7 +3,8 @@
 #include <limits>
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

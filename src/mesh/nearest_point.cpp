@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mesh/box_tree.h"
+#include "mesh/field_range.h"
 #include "mesh/geometry.h"
 
 namespace tessera {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/execution.h"
 #include "mesh/element_index.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -7,12 +7,13 @@
 #include <unordered_map>
 #include <utility>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "mesh/element_merge.h"
 #include "mesh/flat_elements.h"
 #include "mesh/geometry.h"
 #include "mesh/precise_volume.h"
 #include "mesh/tet_complex.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -5,10 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
 #include "mesh/change_judge.h"
 #include "mesh/element_class.h"
-#include "mesh/tet_mesh.h"
+#include "mesh/field_range.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -7,7 +7,8 @@
 #include <span>
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "mesh/geometry.h"
 
 namespace tessera {

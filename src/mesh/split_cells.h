@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/execution.h"
-#include "base/vec.h"
+#include "tessera/execution.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

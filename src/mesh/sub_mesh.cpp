@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "mesh/element_index.h"
 
 namespace tessera {

@@ -5,7 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "mesh/field_range.h"
 
 namespace tessera {
 

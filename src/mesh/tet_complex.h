@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

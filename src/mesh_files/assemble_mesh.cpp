@@ -9,11 +9,12 @@
 #include <span>
 #include <utility>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "files/name_list.h"
 #include "mesh/mesh_quality.h"
 #include "mesh_files/join_parts.h"
 #include "mesh_files/raw_mesh.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <string_view>
 
-#include "base/error.h"
 #include "files/input_file.h"
 #include "files/xml_tags.h"
 #include "mesh_files/xml_check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

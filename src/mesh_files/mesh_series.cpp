@@ -10,10 +10,10 @@
 #include <string_view>
 #include <tuple>
 
-#include "base/error.h"
 #include "base/text.h"
 #include "files/input_file.h"
 #include "files/xml_tags.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "base/error.h"
 #include "files/input_file.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -10,8 +10,8 @@
 #include <array>
 #include <cstdint>
 
-#include "base/error.h"
 #include "mesh_files/netcdf_check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <string_view>
 
-#include "base/error.h"
 #include "files/input_file.h"
 #include "mesh_files/assemble_mesh.h"
 #include "mesh_files/raw_mesh.h"
 #include "mesh_files/read_tetgen.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

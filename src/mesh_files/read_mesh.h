@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/execution.h"
 #include "mesh/split_cells.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -5,8 +5,8 @@
 #include <limits>
 #include <string_view>
 
-#include "base/error.h"
 #include "files/input_file.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

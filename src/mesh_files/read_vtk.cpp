@@ -26,13 +26,13 @@
 #include <set>
 #include <string_view>
 
-#include "base/error.h"
 #include "files/name_list.h"
 #include "mesh_files/legacy_check.h"
 #include "mesh_files/vtk_convert.h"
 #include "mesh_files/vtk_messages.h"
 #include "mesh_files/vtk_source.h"
 #include "mesh_files/xml_check.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

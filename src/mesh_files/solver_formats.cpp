@@ -7,7 +7,7 @@
 
 #include <utility>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "mesh_files/ensight_check.h"
 #include "mesh_files/foam_check.h"
 #include "mesh_files/open_check.h"

@@ -23,7 +23,8 @@
 #include <set>
 #include <span>
 
-#include "base/error.h"
+#include "base/parallel.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -12,10 +12,10 @@
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
-#include "base/error.h"
 #include "files/atomic_file.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_files/vtk_messages.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -8,10 +8,10 @@
 #include <set>
 #include <string_view>
 
-#include "base/error.h"
 #include "files/input_file.h"
 #include "files/xml_tags.h"
 #include "mesh_files/xml_arrays.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

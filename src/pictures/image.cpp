@@ -8,10 +8,11 @@
 #include <cstdio>
 #include <cstring>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "base/text.h"
 #include "files/atomic_file.h"
 #include "pictures/bitmap_font.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

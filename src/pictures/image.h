@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/seams.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

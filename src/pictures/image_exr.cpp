@@ -15,8 +15,9 @@
 #include <array>
 #include <set>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "files/atomic_file.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "pictures/image.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 namespace {

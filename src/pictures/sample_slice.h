@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/seams.h"
 #include "pictures/image.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

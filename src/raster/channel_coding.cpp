@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mesh/field_range.h"
+
 namespace tessera {
 
 namespace {

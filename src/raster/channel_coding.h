@@ -1,8 +1,9 @@
 #pragma once
 
 #include "device/value_coding.h"
-#include "mesh/tet_mesh.h"
+#include "mesh/field_range.h"
 #include "raster/element_shape.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

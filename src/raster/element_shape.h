@@ -3,9 +3,10 @@
 #include <array>
 #include <cstdint>
 
-#include "base/vec.h"
 #include "index_space/node_frame.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

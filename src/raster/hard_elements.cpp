@@ -4,8 +4,10 @@
 #include <cmath>
 #include <optional>
 
+#include "base/parallel.h"
 #include "raster/prepared_region.h"
 #include "software/scan_kernel.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "base/parallel.h"
 #include "raster/regions.h"
 
 namespace tessera {

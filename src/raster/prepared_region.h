@@ -5,12 +5,13 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "device/texture_slots.h"
 #include "index_space/node_frame.h"
 #include "raster/channel_coding.h"
 #include "raster/element_shape.h"
 #include "raster/slice_batch.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

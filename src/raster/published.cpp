@@ -2,7 +2,9 @@
 
 #include <cmath>
 
+#include "base/parallel.h"
 #include "raster/prepared_region.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

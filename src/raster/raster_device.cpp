@@ -4,11 +4,11 @@
 #include <cstring>
 #include <utility>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
 #include "raster/hard_elements.h"
 #include "raster/shaders.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

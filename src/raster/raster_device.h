@@ -14,7 +14,7 @@
 #include "gl/gl_thread.h"
 #include "raster/hard_elements.h"
 #include "raster/prepared_region.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <optional>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "base/timer.h"
 #include "device/texture_slots.h"
 #include "gl/gl_platform.h"
@@ -18,6 +18,8 @@
 #include "raster/regions.h"
 #include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
+#include "resample/statistic_names.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

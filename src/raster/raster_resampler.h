@@ -6,7 +6,8 @@
 #include <vector>
 
 #include "raster/slice_batch.h"
-#include "resample/resampler.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -4,6 +4,8 @@
 #include <map>
 #include <tuple>
 
+#include "base/floor_div.h"
+
 namespace tessera {
 
 namespace {

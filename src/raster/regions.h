@@ -4,7 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "base/vec.h"
+#include "tessera/lattice.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

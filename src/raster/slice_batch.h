@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "base/vec.h"
 #include "raster/element_shape.h"
 #include "raster/published.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -14,13 +14,13 @@
 #include <new>
 #include <optional>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "mesh_files/raw_mesh.h"
 #include "reader/mesh_packet.h"
 #include "reader/reader_limits.h"
 #include "reader/reader_process.h"
 #include "reader/reader_report.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

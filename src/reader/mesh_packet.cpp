@@ -7,6 +7,8 @@
 #include <string>
 #include <type_traits>
 
+#include "base/parallel.h"
+
 namespace tessera {
 
 namespace {
@@ -181,7 +183,11 @@ std::int64_t packetBytes(const MeshFile& file) {
 }
 
 void writePacket(MeshFile file, const PacketSink& sink) {
-    checkMesh(file.mesh);
+    try {
+        checkMesh(file.mesh);
+    } catch (const InputError& error) {
+        throw InternalError(error.what());  // a reader's fault, not the file's
+    }
     const std::string head = headOf(file);
     const PacketStart start{kMagic, std::uint64_t(packetBytes(file)), head.size()};
     sink(&start, sizeof start);

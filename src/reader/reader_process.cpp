@@ -19,8 +19,8 @@
 #include <thread>
 #include <utility>
 
-#include "base/error.h"
 #include "reader/mesh_packet.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <charconv>
 
-#include "base/error.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -16,12 +16,12 @@
 #include <new>
 #include <system_error>
 
-#include "base/error.h"
 #include "base/timer.h"
 #include "reader/isolated_reader.h"
 #include "reader/mesh_packet.h"
 #include "reader/reader_process.h"
 #include "reader/reader_report.h"
+#include "tessera/error.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define TESSERA_SHADOW_MEMORY 1  // terabytes of address space: no limit can be set

@@ -9,7 +9,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "mesh/field_range.h"
 #include "reference/format_allowance.h"
 #include "reference/random.h"
 

@@ -4,9 +4,9 @@
 #include <span>
 #include <string>
 
-#include "lattice/block.h"
 #include "reference/reference_block.h"
-#include "resample/resampler.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -12,7 +12,7 @@
 #include <cmath>
 #include <map>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "mesh/geometry.h"
 #include "reference/generators.h"
 

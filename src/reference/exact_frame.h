@@ -5,8 +5,8 @@
 #include <array>
 #include <vector>
 
-#include "lattice/lattice.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

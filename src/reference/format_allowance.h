@@ -2,8 +2,9 @@
 
 #include <span>
 
-#include "mesh/tet_mesh.h"
+#include "mesh/field_range.h"
 #include "resample/format_error.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "mesh/geometry.h"
 #include "reference/delaunay.h"
 #include "reference/random.h"

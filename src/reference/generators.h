@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 // Meshes for tests and benchmarks: no fields, the same on every run and platform but for the last bits of
 // std::pow in meshes graded by a power other than 1.

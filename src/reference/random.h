@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "base/vec.h"
+#include "tessera/vec.h"
 
 namespace tessera {
 

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 
 namespace tessera {
 

@@ -4,8 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "reference/oracle.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

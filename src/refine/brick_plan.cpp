@@ -6,7 +6,9 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "base/parallel.h"
 #include "brick/kept_points.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -6,13 +6,13 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_tree.h"
 #include "brick/depth.h"
 #include "brick/growing_tree.h"
 #include "brick/overlap.h"
 #include "mesh/element_index.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -6,8 +6,8 @@
 
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
-#include "refine/error_report.h"
-#include "resample/resampler.h"
+#include "tessera/report.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

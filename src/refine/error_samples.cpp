@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "brick/leaf_tiles.h"
+#include "mesh/field_range.h"
 #include "mesh/geometry.h"
 
 namespace tessera {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "brick/seams.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "refine/sample_errors.h"
 
 namespace tessera {

@@ -4,12 +4,12 @@
 #include <span>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
 #include "brick/seams.h"
-#include "mesh/tet_mesh.h"
-#include "refine/error_report.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+#include "tessera/report.h"
 
 namespace tessera {
 

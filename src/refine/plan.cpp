@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <string>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "refine/plan_frame.h"
 #include "refine/refine_options.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_tree.h"
-#include "mesh/tet_mesh.h"
 #include "refine/refine_options.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

@@ -7,9 +7,10 @@
 #include <cstdio>
 #include <string>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "refine/refine_options.h"
 #include "refine/used_nodes.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

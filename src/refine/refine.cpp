@@ -7,9 +7,10 @@
 #include <limits>
 #include <tuple>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "base/timer.h"
 #include "brick/kept_points.h"
+#include "mesh/field_range.h"
 #include "refine/brick_result.h"
 #include "refine/error_samples.h"
 #include "refine/measure_error.h"
@@ -17,6 +18,7 @@
 #include "refine/plan_frame.h"
 #include "refine/refine_options.h"
 #include "refine/resample_tree.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

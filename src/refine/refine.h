@@ -3,11 +3,11 @@
 #include <span>
 #include <string>
 
-#include "base/execution.h"
-#include "mesh/tet_mesh.h"
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
-#include "resample/resampler.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -4,13 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "base/vec.h"
-#include "resample/resampler.h"
+#include "tessera/criterion.h"
+#include "tessera/resampler.h"
+#include "tessera/vec.h"
 
 namespace tessera {
-
-enum class Criterion { uniform, elementSize, error };
-enum class ErrorMeasure { max, rms };
 
 /// A frame that the plan must use: the lattice of another file, or of the first step of a time series.
 struct FixedFrame {

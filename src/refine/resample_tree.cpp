@@ -3,8 +3,9 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "base/error.h"
+#include "base/floor_div.h"
 #include "refine/resample_tree.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -2,10 +2,10 @@
 
 #include <span>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
-#include "resample/resampler.h"
+#include "tessera/execution.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "brick/leaf_tiles.h"
 #include "mesh/geometry.h"
 #include "refine/used_nodes.h"

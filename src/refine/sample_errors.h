@@ -4,8 +4,8 @@
 #include <optional>
 #include <vector>
 
-#include "base/execution.h"
 #include "refine/error_samples.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -2,6 +2,8 @@
 
 #include <atomic>
 
+#include "base/parallel.h"
+
 namespace tessera {
 
 std::vector<std::uint8_t> usedNodes(const TetMesh& mesh, const Execution& execution) {

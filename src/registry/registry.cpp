@@ -1,14 +1,14 @@
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 #include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
 #include "hybrid/hybrid_resampler.h"
 #include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
+#include "tessera/error.h"
 
 namespace tessera {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "mesh/sub_mesh.h"
 
 namespace tessera {

@@ -7,7 +7,9 @@
 #include <span>
 #include <vector>
 
-#include "resample/resampler.h"
+#include "mesh/element_index.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "lattice/lattice.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -5,8 +5,9 @@
 #include <cstdio>
 #include <limits>
 
-#include "base/error.h"
 #include "mesh/sub_mesh.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mesh/plane_query.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 // A free cut plane through a mesh: a lattice with one layer, after M. Weiler and T. Ertl, Hardware-Software-
 // Balanced Resampling for the Interactive Visualization of Unstructured Grids, IEEE Visualization 2001,

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <string_view>
 
-#include "lattice/block.h"
-#include "resample/resampler.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 

@@ -1,4 +1,6 @@
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
+
+#include "tessera/lattice.h"
 
 #include "resample/device_slots.h"
 

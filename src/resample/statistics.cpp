@@ -1,4 +1,4 @@
-#include "resample/statistics.h"
+#include "tessera/statistics.h"
 
 #include <algorithm>
 

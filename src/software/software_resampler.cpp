@@ -10,12 +10,15 @@
 #include <optional>
 #include <utility>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "base/timer.h"
 #include "index_space/element_bins.h"
 #include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
+#include "resample/statistic_names.h"
 #include "software/scan_kernel.h"
+#include "tessera/error.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

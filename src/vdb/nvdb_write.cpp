@@ -14,9 +14,10 @@
 #include <new>
 #include <ostream>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb/openvdb_grids.h"
 
 namespace tessera {

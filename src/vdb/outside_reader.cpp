@@ -7,7 +7,7 @@
 #include <cmath>
 #include <mutex>
 
-#include "base/error.h"
+#include "base/parallel.h"
 #include "base/text.h"
 #include "brick/leaf_tiles.h"
 #include "refine/error_samples.h"

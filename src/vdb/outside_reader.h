@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
 #include "vdb/vdb_file.h"
 
 namespace tessera {

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "vdb/openvdb_grids.h"
 
 namespace tessera {

@@ -4,8 +4,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
 #include "files/json_parse.h"
+#include "tessera/error.h"
 
 namespace tessera {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "refine/error_report.h"
+#include "tessera/report.h"
 
 namespace tessera {
 

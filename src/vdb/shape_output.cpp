@@ -6,12 +6,12 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
 #include "base/text.h"
 #include "brick/extend.h"
 #include "brick/flatten.h"
 #include "refine/brick_result.h"
 #include "refine/measure_error.h"
+#include "tessera/lattice.h"
 #include "vdb/vdb_metadata.h"
 #include "vdb/vdb_write.h"
 

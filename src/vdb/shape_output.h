@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
-#include "mesh/tet_mesh.h"
 #include "refine/brick_result.h"
 #include "refine/refine.h"
-#include "resample/resampler.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+#include "tessera/resampler.h"
 #include "vdb/vdb_file.h"
 
 namespace tessera {

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
 #include "brick/seams.h"
 #include "refine/refine.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

@@ -6,10 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "base/text.h"
 #include "files/json_parse.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb/report_json.h"
 
 namespace tessera {

@@ -19,9 +19,10 @@
 #include <unordered_set>
 #include <utility>
 
-#include "base/error.h"
+#include "base/floor_div.h"
 #include "files/file_digest.h"
 #include "refine/refine_options.h"
+#include "tessera/error.h"
 #include "vdb/openvdb_grids.h"
 #include "vdb/vdb_metadata.h"
 

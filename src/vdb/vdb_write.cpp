@@ -9,11 +9,14 @@
 #include <ostream>
 #include <tuple>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "base/text.h"
 #include "files/atomic_file.h"
 #include "files/file_digest.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb/openvdb_grids.h"
 #include "vdb/packed_grid.h"
 #include "vdb/vdb_metadata.h"

@@ -11,10 +11,13 @@
 #include <glm/common.hpp>
 #include <limits>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "base/text.h"
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
+#include "tessera/error.h"
 #include "vdb/vdb_metadata.h"
 
 namespace tessera {

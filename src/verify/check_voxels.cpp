@@ -6,10 +6,14 @@
 #include <cstdio>
 #include <memory>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/floor_div.h"
+#include "base/parallel.h"
 #include "brick/extend.h"
 #include "brick/flatten.h"
 #include "brick/kept_points.h"
+#include "mesh/field_range.h"
+#include "tessera/lattice.h"
 
 namespace tessera {
 

@@ -7,7 +7,7 @@
 
 #include "brick/brick_store.h"
 #include "brick/brick_tree.h"
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 #include "verify/point_checker.h"
 
 namespace tessera {

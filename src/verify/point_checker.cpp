@@ -5,7 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "base/error.h"
+#include "base/check.h"
+#include "base/parallel.h"
 #include "resample/format_error.h"
 
 namespace tessera {

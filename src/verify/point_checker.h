@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "base/execution.h"
-#include "lattice/block.h"
-#include "resample/resampler.h"
+#include "mesh/field_range.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/resampler.h"
 #include "verify/voxel_mesh.h"
 
 namespace tessera {

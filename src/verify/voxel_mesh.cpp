@@ -4,9 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "base/error.h"
-#include "base/execution.h"
+#include "base/parallel.h"
 #include "mesh/geometry.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
 
 namespace tessera {
 

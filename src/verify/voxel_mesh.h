@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "brick/seams.h"
-#include "lattice/lattice.h"
 #include "mesh/element_index.h"
-#include "mesh/tet_mesh.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 

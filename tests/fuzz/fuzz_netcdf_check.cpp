@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "base/check.h"
 #include "fuzz_tools.h"
 #include "mesh_files/netcdf_check.h"
 

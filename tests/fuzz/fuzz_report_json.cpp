@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/check.h"
 #include "fuzz_tools.h"
 #include "vdb/report_json.h"
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/check.h"
 #include "fuzz_tools.h"
 #include "mesh_files/assemble_mesh.h"
 #include "mesh_files/read_tetgen.h"

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <string>
 
-#include "base/error.h"
-#include "base/execution.h"
+#include "base/check.h"
 #include "mesh_files/read_mesh.h"
+#include "tessera/error.h"
+#include "tessera/execution.h"
 
 namespace tessera::fuzz {
 

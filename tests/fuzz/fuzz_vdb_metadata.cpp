@@ -5,7 +5,9 @@
 #include <string>
 #include <string_view>
 
+#include "base/check.h"
 #include "fuzz_tools.h"
+#include "tessera/lattice.h"
 #include "vdb/vdb_metadata.h"
 
 namespace tessera {

@@ -14,7 +14,7 @@
 
 #include "hard_cases.h"
 #include "perturbed_cases.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace tessera::hard_cases {
 namespace {

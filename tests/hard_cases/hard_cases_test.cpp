@@ -16,7 +16,7 @@
 #include <sstream>
 
 #include "mesh/element_class.h"
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace tessera::hard_cases {
 namespace {

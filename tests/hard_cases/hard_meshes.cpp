@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "base/error.h"
+#include "base/check.h"
 #include "reference/random.h"
 
 namespace tessera::hard_cases {

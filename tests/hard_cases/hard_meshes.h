@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "mesh/tet_mesh.h"
 #include "reference/generators.h"
+#include "tessera/mesh.h"
 
 // Meshes that break other tools, without fields. All are made of additions, multiplications, divisions and
 // square roots only, so they are the same bit for bit on every machine.

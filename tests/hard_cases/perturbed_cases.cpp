@@ -6,6 +6,7 @@
 #include <limits>
 #include <mutex>
 
+#include "base/parallel.h"
 #include "hard_cases.h"
 #include "hard_meshes.h"
 #include "mesh/geometry.h"

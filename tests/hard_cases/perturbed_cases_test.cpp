@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "registry/registry.h"
+#include "tessera/registry.h"
 
 namespace tessera::hard_cases {
 namespace {

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "hard_cases.h"
+#include "mesh/field_range.h"
 #include "mesh/geometry.h"
 #include "mesh/repair.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "resample/resampler.h"
+#include "tessera/resampler.h"
 
 namespace tessera {
 
@@ -28,7 +28,8 @@ const Resampler& namedResampler(std::string_view name);
 
 struct ResamplerChoice {
     const Resampler* resampler = nullptr;
-    std::string reason;  ///< auto: a sentence for the user, which one and why; else empty
+    /// Auto: a sentence for the user, which one and why; else empty.
+    std::string reason;
 };
 
 /// The resampler of that name, or, for "auto", the one with the least Resampler::relativeCost() among those

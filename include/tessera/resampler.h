@@ -10,13 +10,14 @@
 #include <utility>
 #include <vector>
 
-#include "base/execution.h"
-#include "lattice/block.h"
-#include "mesh/element_index.h"
-#include "mesh/tet_mesh.h"
-#include "resample/statistics.h"
+#include "tessera/execution.h"
+#include "tessera/lattice.h"
+#include "tessera/mesh.h"
+#include "tessera/statistics.h"
 
 namespace tessera {
+
+class SharedElementIndex;
 
 /// How a resampler keeps a value before it is handed over as a float. The normalised formats divide the
 /// field's range into equal steps; they exist on OpenGL targets.
@@ -26,14 +27,18 @@ std::string_view nameOf(SampleFormat format);
 
 /// How a bound resampler comes to the elements near its boxes. Samples have the same bits by each.
 enum class Route {
-    automatic,  ///< by the index where the boxes are a small part of the mesh and it is there or pays
-    index,      ///< by the element index: costs what the boxes hold
-    pass,       ///< by a pass over the whole mesh: needs no index
+    /// By the index where the boxes are a small part of the mesh and it is there or pays.
+    automatic,
+    /// By the element index: costs what the boxes hold.
+    index,
+    /// By a pass over the whole mesh: needs no index.
+    pass,
 };
 
 /// What BoundResampler runs with.
 struct BindOptions {
-    std::string target;  ///< one of Resampler::targets(); empty: the first
+    /// One of Resampler::targets(); empty: the first.
+    std::string target;
     SampleFormat format = SampleFormat::r32f;
     Route route = Route::automatic;
     /// Of the mesh that is bound, to share it with others; null: one of its own, built when it pays.
@@ -71,8 +76,10 @@ class BoundResampler {
 
 /// What an algorithm is and can do.
 struct ResamplerInfo {
-    std::string name;         ///< as on the command line, e.g. "software"
-    std::string description;  ///< one line
+    /// As on the command line, e.g. "software".
+    std::string name;
+    /// One line.
+    std::string description;
     /// Its targets are graphics devices or drivers, and its samples can stay there.
     bool isOnDevice = false;
     /// All targets give the same bits. Not so where each is a device of its own.

@@ -1,4 +1,6 @@
-#include "base/error.h"
+#include "base/check.h"
+
+#include "tessera/error.h"
 
 namespace tessera {
 

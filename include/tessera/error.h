@@ -1,7 +1,6 @@
 #pragma once
 
 #include <stdexcept>
-#include <string>
 
 namespace tessera {
 
@@ -35,17 +34,10 @@ class Cancelled : public std::runtime_error {
     Cancelled() : std::runtime_error("cancelled") {}
 };
 
-/// A bug in Tessera itself, raised by TESSERA_CHECK.
+/// A bug in Tessera itself: the message names the place in its sources.
 class InternalError : public std::logic_error {
   public:
     using std::logic_error::logic_error;
 };
 
-[[noreturn]] void throwInternalError(const char* condition, const char* file, int line,
-                                     const std::string& note);
-
 }  // namespace tessera
-
-/// Always on: throws InternalError with the place when `condition` is false.
-#define TESSERA_CHECK(condition, note) \
-    ((condition) ? void(0) : ::tessera::throwInternalError(#condition, __FILE__, __LINE__, (note)))

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 
 namespace tessera {
 
@@ -12,10 +11,13 @@ enum class Stage : std::uint8_t {
     repairing,
     planning,
     sampling,
-    checking,   ///< measuring the error of what was sampled last, between rounds of refinement
-    measuring,  ///< measuring the error of everything
+    /// Measuring the error of what was sampled last, between rounds of refinement.
+    checking,
+    /// Measuring the error of everything.
+    measuring,
     comparing,
-    extending,  ///< finding values outside the mesh
+    /// Finding values outside the mesh.
+    extending,
     writing
 };
 
@@ -32,11 +34,16 @@ class ProgressSink {
 
 /// How long work runs: threads, cancellation, progress. Results never depend on it.
 struct Execution {
-    int threads = 0;                            ///< worker threads; 0: one for every processor
-    const std::atomic<bool>* cancel = nullptr;  ///< when it turns true, work stops with Cancelled
-    ProgressSink* progress = nullptr;           ///< may be null
+    /// Worker threads; 0: one for every processor.
+    int threads = 0;
+    /// When it turns true, work stops and throws Cancelled; may be null.
+    const std::atomic<bool>* cancel = nullptr;
+    /// May be null.
+    ProgressSink* progress = nullptr;
 
+    /// Worker threads, at least 1.
     int threadCount() const;
+    /// Throws Cancelled when the caller asked to stop.
     void throwIfCancelled() const;
     void report(Stage stage, std::int64_t done, std::int64_t total) const {
         if (progress) progress->update(stage, done, total);
@@ -47,15 +54,5 @@ struct Execution {
     /// For the parts of work whose progress the caller reports itself.
     Execution withoutProgress() const { return {threads, cancel, nullptr}; }
 };
-
-/// Calls body(i) once for every i in [0, count), in any order, on any thread. The first exception stops the
-/// loop and is rethrown. Checks for cancellation between items.
-void parallelFor(const Execution& execution, std::int64_t count,
-                 const std::function<void(std::int64_t)>& body);
-
-/// Calls body(begin, end) on fixed chunks of `chunk` items of [0, count): chunk borders, and so any per-chunk
-/// result, do not depend on the number of threads.
-void parallelForChunks(const Execution& execution, std::int64_t count, std::int64_t chunk,
-                       const std::function<void(std::int64_t, std::int64_t)>& body);
 
 }  // namespace tessera
