@@ -11,6 +11,7 @@
 #include "brick/growing_tree.h"
 #include "brick/overlap.h"
 #include "mesh/element_index.h"
+#include "tessera/execution.h"
 #include "tessera/mesh.h"
 
 namespace tessera {
