@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/execution.h"
 #include "brick/seams.h"
+#include "mesh/tet_mesh.h"
 
 namespace tessera {
 
@@ -20,6 +22,9 @@ struct ScalarImage {
 
     std::size_t offset(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
 };
+
+/// Range of the finite values where there is coverage.
+ValueRange shownRange(std::span<const float> values, std::span<const std::uint8_t> coverage);
 
 /// 8 bits of red, green and blue a pixel, row by row from the top left.
 struct RgbImage {
