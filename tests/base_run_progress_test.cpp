@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -107,7 +108,8 @@ TEST(RunProgress, ASeriesIsOneRun) {
     run.progress.declare({{Stage::reading, 1}, {Stage::sampling, 3}});
     double last = 0;
     for (int step = 0; step < 4; ++step) {
-        run.progress.beginStep(1, 3 - step);
+        run.progress.beginStep("step " + std::to_string(step), 1, 3 - step);
+        EXPECT_EQ(run.progress.state().step, "step " + std::to_string(step));
         EXPECT_NEAR(run.share(), 0.25 * step, 1e-6);
         for (const Stage stage : {Stage::reading, Stage::sampling}) {
             run.pass(stage, 1000);

@@ -7,6 +7,7 @@ if(TESSERA_BUILD_IO)
   endforeach()
   tessera_test(vdb_metadata_test LINK vdb)
   tessera_test(library_test LINK library reference)
+  tessera_test(job_test LINK job)
   tessera_test(nvdb_test LINK vdb PRIVATE_LINK tessera_nanovdb)
   tessera_test(vti_test LINK vdb PRIVATE_LINK tessera_openvdb VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel VTK::IOXML)
   # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.

@@ -5,9 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <limits>
+#include <memory>
 #include <sstream>
 
-#include "program_presets.h"
+#include "commands.h"
+#include "job/program_presets.h"
+#include "job/wrap_text.h"
 #include "resample/cut_plane.h"
 #include "terminal.h"
 #include "tessera/error.h"
@@ -151,7 +154,7 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
         ->group(group);
     command.add_option("--spacing", a.spacing, "spacing of the finest level, in world units")->group(group);
     command
-        .add_option("--samples-per-element", a.samplesPerElement,
+        .add_option("--samples-per-element", a.request.refine.samplesPerElement,
                     "element-size: samples along a typical element edge")
         ->capture_default_str()
         ->group(group);
@@ -171,12 +174,15 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
         .add_option("--error-field", a.errorFields,
                     "error: fields a,b that the bound holds for (default: all point fields chosen)")
         ->group(group);
-    command.add_option("--brick-size", a.brickSize, "cells along a brick's edge: 8, 16, 32 or 64")
+    command
+        .add_option("--brick-size", a.request.refine.brickCells,
+                    "cells along a brick's edge: 8, 16, 32 or 64")
         ->capture_default_str()
         ->group(group);
     command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")
         ->group(group);
-    command.add_option("--like", a.like, "use the lattice (origin and finest spacing) of this .vdb file")
+    command
+        .add_option("--like", a.request.like, "use the lattice (origin and finest spacing) of this .vdb file")
         ->group(group);
     command
         .add_option("--max-voxels", a.maxVoxels,
@@ -189,7 +195,7 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
             "--reader in-process reading itself has no bound")
         ->group(group);
     command
-        .add_flag("--dry-run", a.dryRun,
+        .add_flag("--dry-run", a.request.dryRun,
                   "print voxels, bytes and predicted time of each layout; write nothing")
         ->group(group);
 }
@@ -199,20 +205,20 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
     command.add_option("--field", a.fields, "fields to sample: a,b=newname,... (default: all)")->group(group);
     command
         .add_option(
-            "--for", a.program,
+            "--for", a.request.program,
             "the program that will read the file: sets --layout, --up-axis, --extend and --voxel-shift, "
             "and gives grids the names that it looks for, unless these are given too")
         ->check(CLI::IsMember(programNames()))
         ->group(group);
     command
-        .add_option("--layout", a.layout,
+        .add_option("--layout", a.file.layout,
                     "levels: one grid a field and level (default for .vdb). flat: one grid a field at the "
                     "finest spacing (.nvdb and .vti hold nothing else)")
         ->check(CLI::IsMember({"levels", "flat"}))
         ->group(group);
-    command.add_flag("--half", a.half, "store values as 16-bit floats")->group(group);
+    command.add_flag("--half", a.request.write.halfFloat, "store values as 16-bit floats")->group(group);
     command
-        .add_option("--extend", a.extendLayers,
+        .add_option("--extend", a.file.extendLayers,
                     "layers of voxels written outside the mesh, with the value at the nearest mesh point "
                     "(default: 1 for "
                     "the flat layout, which Blender and Houdini interpolate without looking at the mesh; 0 "
@@ -229,17 +235,17 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
                     "file units per world unit (default: 1, or a power of ten when voxels are tiny)")
         ->group(group);
     command
-        .add_option("--up-axis", a.upAxis,
+        .add_option("--up-axis", a.file.upAxis,
                     "turn the grid so that this axis of the file points up: keep, y or z (default: keep)")
         ->check(CLI::IsMember({"keep", "y", "z"}))
         ->group(group);
     command
         .add_option(
-            "--voxel-shift", a.voxelShift,
+            "--voxel-shift", a.file.voxelShift,
             "share of a voxel by which the file places every voxel beside its sample, along x, y and z, for "
             "programs that draw it elsewhere (default: 0)")
         ->group(group);
-    addTimeStep(command, a.timeStep)->group(group);
+    addTimeStep(command, a.request.timeStep)->group(group);
 }
 
 /// What standard output gets, which has no ending. The first kind is the default.
@@ -268,11 +274,11 @@ std::string fileKinds() {
 void addResampleOptions(CLI::App& command, ResampleArguments& a) {
     command
         .add_option(
-            "mesh", a.inputs,
+            "mesh", a.request.inputs,
             "a mesh file, or the steps of a series: mesh files and patterns such as 'run_*.vtu', taken in "
             "the order of the numbers in their names (run_2 before run_10), or one .pvd file")
         ->required();
-    command.add_option("-o,--output", a.output,
+    command.add_option("-o,--output", a.request.output,
                        fileKinds() +
                            "; - for standard output. #### or %04d stands for the step's number in a series, "
                            "%% for a percent sign");
@@ -300,11 +306,11 @@ void addResampleOptions(CLI::App& command, ResampleArguments& a) {
 }
 
 void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
-    command.add_option("file", arguments.paths,
+    command.add_option("file", arguments.request.paths,
                        "a mesh file, a .vdb file that tessera wrote, or a series as resample takes it: mesh "
                        "files, patterns, or one .pvd file");
-    command.add_flag("--gl", arguments.gl, "what OpenGL this machine has; the file may be left out");
-    addTimeStep(command, arguments.timeStep);
+    command.add_flag("--gl", arguments.request.gl, "what OpenGL this machine has; the file may be left out");
+    addTimeStep(command, arguments.request.timeStep);
     addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
     command.footer(
@@ -313,10 +319,10 @@ void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
 }
 
 void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
-    command.add_option("mesh", arguments.meshPath, "the mesh file that the .vdb file was made from")
+    command.add_option("mesh", arguments.request.meshPath, "the mesh file that the .vdb file was made from")
         ->required();
-    command.add_option("vdb", arguments.vdbPath, "the .vdb file")->required();
-    addTimeStep(command, arguments.timeStep);
+    command.add_option("vdb", arguments.request.vdbPath, "the .vdb file")->required();
+    addTimeStep(command, arguments.request.timeStep);
     addCommonOptions(command, arguments.common);
     command.footer(
         "Checks every voxel against the mesh, reads the grids as other programs do, measures the error anew "
@@ -326,35 +332,38 @@ void addVerifyOptions(CLI::App& command, VerifyArguments& arguments) {
 }
 
 void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
-    command.add_option("mesh", arguments.input, "mesh file")->required();
-    command.add_option("-o,--output", arguments.output, "the .vtu file of tetrahedra; - for standard output")
+    command.add_option("mesh", arguments.request.input, "mesh file")->required();
+    command
+        .add_option("-o,--output", arguments.request.output,
+                    "the .vtu file of tetrahedra; - for standard output")
         ->required();
-    addTimeStep(command, arguments.timeStep);
+    addTimeStep(command, arguments.request.timeStep);
     addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);
     command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
 }
 
 void addPictureOptions(CLI::App& command, PictureArguments& a) {
-    command.add_option("vdb", a.input, "a .vdb file that tessera wrote")->required();
-    command.add_option("-o,--output", a.output, "the .png file; - for standard output")->required();
-    command.add_option("--field", a.field, "the field (default: the first)");
+    command.add_option("vdb", a.request.input, "a .vdb file that tessera wrote")->required();
+    command.add_option("-o,--output", a.request.output, "the .png file; - for standard output")->required();
+    command.add_option("--field", a.request.field, "the field (default: the first)");
     command
-        .add_option("--component", a.component, "component of a vector, counted from 0 (default: its length)")
+        .add_option("--component", a.request.component,
+                    "component of a vector, counted from 0 (default: its length)")
         ->check(CLI::Range(0, 8));
     command.add_option("--axis", a.axis, "the slice is normal to this axis")
         ->check(CLI::IsMember({"x", "y", "z"}))
         ->capture_default_str();
-    command.add_option("--at", a.at, "where along that axis, world units (default: the middle)");
+    command.add_option("--at", a.request.at, "where along that axis, world units (default: the middle)");
     command.add_option("--bounds", a.bounds, "show only the box x0,y0,z0,x1,y1,z1");
     command.add_option("--range", a.range,
                        "values a,b at the ends of the colour map (default: those of the slice)");
-    command.add_option("--mesh", a.mesh,
+    command.add_option("--mesh", a.request.mesh,
                        "the mesh file: draws up to the mesh's surface instead of whole voxels");
-    command.add_option("--pixels", a.pixels, "along the longer edge")
+    command.add_option("--pixels", a.request.pixels, "along the longer edge")
         ->check(CLI::Range(16, 8192))
         ->capture_default_str();
-    command.add_flag("--bricks", a.bricks, "draw the edges of the bricks");
+    command.add_flag("--bricks", a.request.bricks, "draw the edges of the bricks");
     addCommonOptions(command, a.common);
     command.footer(
         "Examples:\n  tessera picture flow.vdb -o slice.png --field pressure --axis z --at 0\n"
@@ -364,13 +373,13 @@ void addPictureOptions(CLI::App& command, PictureArguments& a) {
 
 void addSliceOptions(CLI::App& command, SliceArguments& a) {
     const std::string where = "Where to cut", what = "What to write";
-    command.add_option("mesh", a.input, "a mesh file")->required();
+    command.add_option("mesh", a.request.input, "a mesh file")->required();
     command
-        .add_option("-o,--output", a.output,
+        .add_option("-o,--output", a.request.output,
                     "a .exr file (32-bit floats: a channel for every component of every field, and "
                     "coverage) or a .png file (one field in colours, with a legend); - for standard output")
         ->required();
-    addFormat(command, a.format, {"exr", "png"});
+    addFormat(command, a.request.format, {"exr", "png"});
     command
         .add_option("--origin", a.origin,
                     "a point x,y,z of the plane (default: the middle of the mesh's box)")
@@ -390,17 +399,17 @@ void addSliceOptions(CLI::App& command, SliceArguments& a) {
             "width and height w,h, or one length s for both, around the origin, in world units (default: as "
             "large as the cut)")
         ->group(where);
-    command.add_option("--resolution", a.resolution, "pixels along the longer edge")
+    command.add_option("--resolution", a.request.cut.resolution, "pixels along the longer edge")
         ->check(CLI::Range(1, kLargestCutResolution))
         ->capture_default_str()
         ->group(where);
-    addTimeStep(command, a.timeStep)->group(where);
+    addTimeStep(command, a.request.timeStep)->group(where);
     command
         .add_option("--field", a.fields,
                     "fields to sample: a,b=newname,... (default: all for .exr, the first for .png)")
         ->group(what);
     command
-        .add_option("--component", a.component,
+        .add_option("--component", a.request.component,
                     ".png: component of a vector, counted from 0 (default: its length)")
         ->check(CLI::Range(0, 8))
         ->group(what);
@@ -419,31 +428,32 @@ void addSliceOptions(CLI::App& command, SliceArguments& a) {
 }
 
 void addCompareOptions(CLI::App& command, CompareArguments& a) {
-    command.add_option("mesh", a.meshes, "mesh files")->required();
+    command.add_option("mesh", a.request.meshes, "mesh files")->required();
     command.add_option(
-        "--algorithms", a.algorithms,
+        "--algorithms", a.request.algorithms,
         "names with commas between them, each with a target if wanted: software,slicing:osmesa; "
         "the first is what the others are compared with (default: all that can run here)");
     addBindOptions(command, a.algorithm);
-    auto* resolution =
-        command
-            .add_option("--resolution", a.resolution, "lattice points along the longest axis (default: 128)")
-            ->check(CLI::Range(2, 1 << 20));
-    command.add_option("--spacing", a.spacing, "spacing of the lattice, in world units")
+    auto* resolution = command
+                           .add_option("--resolution", a.request.resolution,
+                                       "lattice points along the longest axis (default: 128)")
+                           ->check(CLI::Range(2, 1 << 20));
+    command.add_option("--spacing", a.request.spacing, "spacing of the lattice, in world units")
         ->check(CLI::PositiveNumber)
         ->excludes(resolution);
     command.add_option("--field", a.fields, "fields to sample: a,b (default: all)");
-    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+    command.add_option("--runs", a.request.runs, "runs of each algorithm; times are medians")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     command
-        .add_option("--box", a.boxEdge,
+        .add_option("--box", a.request.boxEdge,
                     "points along the edge of the boxes sampled at once; smaller ones are taken when many "
                     "channels need it")
         ->check(CLI::Range(16, 512))
         ->capture_default_str();
-    command.add_flag("--markdown", a.markdown, "print one table in Markdown, one row a mesh and algorithm");
-    addTimeStep(command, a.timeStep);
+    command.add_flag("--markdown", a.request.markdown,
+                     "print one table in Markdown, one row a mesh and algorithm");
+    addTimeStep(command, a.request.timeStep);
     addRepairOptions(command, a.repair);
     addCommonOptions(command, a.common);
     command.footer(
@@ -459,19 +469,19 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
 }
 
 void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
-    command.add_option("mesh", a.mesh, "mesh file; the paper's is the bluntfin")->required();
+    command.add_option("mesh", a.request.mesh, "mesh file; the paper's is the bluntfin")->required();
     addBindOptions(command, a.algorithm);
-    command.add_option("--field", a.field,
+    command.add_option("--field", a.request.field,
                        "the field to sample (default: the first scalar field of the points)");
-    command.add_option("--runs", a.runs, "runs of each algorithm; times are medians")
+    command.add_option("--runs", a.request.runs, "runs of each algorithm; times are medians")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     command
-        .add_option("--max-size", a.maxSize,
+        .add_option("--max-size", a.request.maxSize,
                     "leave out grids with more points than this along an axis (there are 128 to 1024)")
         ->check(CLI::Range(128, 1024))
         ->capture_default_str();
-    command.add_flag("--as-published", a.asPublished,
+    command.add_flag("--as-published", a.request.asPublished,
                      "time slicing-2001 and hybrid-2001, the methods as they were published");
     addCommonOptions(command, a.common);
     command.footer(
@@ -482,7 +492,17 @@ void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
         "  tessera paper-tables bluntfin.vtu --as-published --max-size 256 --json tables.json");
 }
 
-void describe(CLI::App& app, CommandLine& arguments) {
+/// A command that runs with what its options were given.
+template <class Arguments>
+void addCommand(CLI::App& app, CommandLine& line, const char* name, const char* description,
+                void (*addOptions)(CLI::App&, Arguments&), int (*run)(const Arguments&)) {
+    CLI::App& command = *app.add_subcommand(name, description);
+    const auto arguments = std::make_shared<Arguments>();
+    addOptions(command, *arguments);
+    command.callback([&line, arguments, run] { line.run = [arguments, run] { return run(*arguments); }; });
+}
+
+void describe(CLI::App& app, CommandLine& line) {
     app.name("tessera");
     app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
     app.set_help_flag("-h,--help", "print this help and exit");
@@ -494,26 +514,21 @@ void describe(CLI::App& app, CommandLine& arguments) {
         "2 bad input or usage, 3 a result that isn't what was asked for (with --strict), 1 any other "
         "failure, "
         "130 interrupted.");
-    addResampleOptions(
-        *app.add_subcommand("resample", "mesh file -> adaptive OpenVDB file, with an error report"),
-        arguments.resample);
-    addInfoOptions(
-        *app.add_subcommand("info", "what a mesh file or a .vdb file holds, or what OpenGL there is"),
-        arguments.info);
-    addVerifyOptions(*app.add_subcommand("verify", "check a .vdb file's error report against its mesh"),
-                     arguments.verify);
-    addTetsOptions(*app.add_subcommand("tets", "write the tetrahedra that a mesh is split into"),
-                   arguments.tets);
-    addPictureOptions(*app.add_subcommand("picture", "draw one slice of a .vdb file as a .png"),
-                      arguments.picture);
-    addCompareOptions(
-        *app.add_subcommand("compare", "several algorithms on one lattice: coverage, values, times"),
-        arguments.compare);
-    addPaperTablesOptions(
-        *app.add_subcommand("paper-tables", "the algorithms' times beside those of the paper they come from"),
-        arguments.paperTables);
-    addSliceOptions(*app.add_subcommand("slice", "cut a mesh with any plane: a float EXR or a .png"),
-                    arguments.slice);
+    addCommand(app, line, "resample", "mesh file -> adaptive OpenVDB file, with an error report",
+               addResampleOptions, runResample);
+    addCommand(app, line, "info", "what a mesh file or a .vdb file holds, or what OpenGL there is",
+               addInfoOptions, runInfo);
+    addCommand(app, line, "verify", "check a .vdb file's error report against its mesh", addVerifyOptions,
+               runVerify);
+    addCommand(app, line, "tets", "write the tetrahedra that a mesh is split into", addTetsOptions, runTets);
+    addCommand(app, line, "picture", "draw one slice of a .vdb file as a .png", addPictureOptions,
+               runPicture);
+    addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
+               addCompareOptions, runCompare);
+    addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",
+               addPaperTablesOptions, runPaperTables);
+    addCommand(app, line, "slice", "cut a mesh with any plane: a float EXR or a .png", addSliceOptions,
+               runSlice);
 }
 
 /// Lines that a terminal would break anywhere, broken between words. Descriptions stay in their column.
@@ -541,7 +556,6 @@ CommandLine parseCommandLine(int argc, char** argv) {
         throw InputError(fmt::format("there is no command '{}' (tessera --help lists them)", argv[1]));
     try {
         app.parse(argc, argv);
-        line.command = app.get_subcommands().front()->get_name();
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() != 0)
             throw InputError(fmt::format("{} (tessera --help tells more)", error.what()));

@@ -1,23 +1,15 @@
 #pragma once
 
+#include <functional>
 #include <string>
-
-#include "commands.h"
 
 namespace tessera {
 
-/// What was typed: the command's name, and the arguments of every command.
+/// What was typed.
 struct CommandLine {
-    std::string command;  ///< empty when help or the version was asked for
-    std::string text;     ///< that help or version
-    ResampleArguments resample;
-    InfoArguments info;
-    VerifyArguments verify;
-    TetsArguments tets;
-    PictureArguments picture;
-    CompareArguments compare;
-    PaperTablesArguments paperTables;
-    SliceArguments slice;
+    std::function<int()>
+        run;           ///< the command: gives the exit code; empty when help or the version was asked for
+    std::string text;  ///< that help or version
 };
 
 /// Throws InputError for words that no command takes.

@@ -13,8 +13,10 @@
 #include "command_line.h"
 #include "files/atomic_file.h"
 #include "interrupt.h"
+#include "job/wrap_text.h"
 #include "progress.h"
-#include "report_text.h"
+#include "reader/serve_mesh_reader.h"
+#include "session.h"
 #include "tessera/error.h"
 
 namespace {
@@ -45,14 +47,7 @@ int codeAfterOutput(int code) {
 }
 
 int run(const tessera::CommandLine& line) {
-    if (line.command == "resample") return tessera::runResample(line.resample);
-    if (line.command == "info") return tessera::runInfo(line.info);
-    if (line.command == "verify") return tessera::runVerify(line.verify);
-    if (line.command == "tets") return tessera::runTets(line.tets);
-    if (line.command == "slice") return tessera::runSlice(line.slice);
-    if (line.command == "compare") return tessera::runCompare(line.compare);
-    if (line.command == "paper-tables") return tessera::runPaperTables(line.paperTables);
-    if (line.command == "picture") return tessera::runPicture(line.picture);
+    if (line.run) return line.run();
     tessera::printOut(line.text);
     return 0;
 }
@@ -60,7 +55,7 @@ int run(const tessera::CommandLine& line) {
 /// What the process that reads a mesh runs; another tessera process is its only user.
 int readMeshForParent(const std::vector<std::string>& words) {
     try {
-        return tessera::runReadMesh(words);
+        return tessera::serveMeshReader(words);
     } catch (const tessera::InputError& error) {
         printError(error.what());
         return kExitBadInput;

@@ -9,8 +9,9 @@
 #include <set>
 
 #include "files/atomic_file.h"
-#include "output_paths.h"
-#include "refine/refine_options.h"
+#include "job/algorithm_list.h"
+#include "job/output_paths.h"
+#include "job/series_steps.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -29,6 +30,16 @@ double parseNumber(const std::string& option, const std::string& text) {
     if (failure != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
         throw InputError(fmt::format("{}: expected a number, got '{}'", option, text));
     return value;
+}
+
+double parseShare(const std::string& option, const std::string& text) {
+    const bool isPercent = text.ends_with('%');
+    const std::string digits = isPercent ? text.substr(0, text.size() - 1) : text;
+    const double share = parseNumber(option, digits) * (isPercent ? 0.01 : 1.0);
+    if (!(share >= 0 && share <= 1))
+        throw InputError(
+            fmt::format("{}: expected a share from 0 to 1 or 0% to 100%, got '{}'", option, text));
+    return share;
 }
 
 std::vector<std::string> split(const std::string& text, char separator) {
@@ -57,36 +68,39 @@ void checkRanges(const ResampleArguments& a) {
                 fmt::format("--resolution: expected 2 to {}, got {}", kLargestResolution, *a.resolution));
     if (a.spacing) requirePositive("--spacing", *a.spacing);
     require(!(a.spacing && a.resolution), "--spacing and --resolution exclude each other");
-    requirePositive("--samples-per-element", a.samplesPerElement);
-    require(a.samplesPerElement <= 1000,
-            fmt::format("--samples-per-element: expected at most 1000, got {}", a.samplesPerElement));
+    requirePositive("--samples-per-element", a.request.refine.samplesPerElement);
+    require(a.request.refine.samplesPerElement <= 1000,
+            fmt::format("--samples-per-element: expected at most 1000, got {}",
+                        a.request.refine.samplesPerElement));
     if (a.maxLevels)
         require(*a.maxLevels >= 1 && *a.maxLevels <= kLargestLevels,
                 fmt::format("--max-levels: expected 1 to {}, got {}", kLargestLevels, *a.maxLevels));
-    require(a.brickSize == 8 || a.brickSize == 16 || a.brickSize == 32 || a.brickSize == 64,
-            fmt::format("--brick-size: expected 8, 16, 32 or 64, got {}", a.brickSize));
-    if (a.extendLayers)
-        require(*a.extendLayers >= 0 && *a.extendLayers <= kLargestExtend,
-                fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, *a.extendLayers));
-    if (a.voxelShift)
-        require(std::abs(*a.voxelShift) <= 1,
-                fmt::format("--voxel-shift: expected -1 to 1, got {}", *a.voxelShift));
-    const double largest = a.half ? kLargestHalf : double(std::numeric_limits<float>::max());
+    require(a.request.refine.brickCells == 8 || a.request.refine.brickCells == 16 ||
+                a.request.refine.brickCells == 32 || a.request.refine.brickCells == 64,
+            fmt::format("--brick-size: expected 8, 16, 32 or 64, got {}", a.request.refine.brickCells));
+    if (a.file.extendLayers)
+        require(*a.file.extendLayers >= 0 && *a.file.extendLayers <= kLargestExtend,
+                fmt::format("--extend: expected 0 to {}, got {}", kLargestExtend, *a.file.extendLayers));
+    if (a.file.voxelShift)
+        require(std::abs(*a.file.voxelShift) <= 1,
+                fmt::format("--voxel-shift: expected -1 to 1, got {}", *a.file.voxelShift));
+    const double largest =
+        a.request.write.halfFloat ? kLargestHalf : double(std::numeric_limits<float>::max());
     require(!a.background || std::abs(*a.background) <= largest,
             fmt::format("--background: expected a number within {:.9g}, the largest of {}-bit floats, got {}",
-                        largest, a.half ? 16 : 32, a.background.value_or(0)));
+                        largest, a.request.write.halfFloat ? 16 : 32, a.background.value_or(0)));
     if (a.unitScale)
         require(*a.unitScale >= kSmallestUnitScale && *a.unitScale <= kLargestUnitScale,
                 fmt::format("--unit-scale: expected {} to {}, got {}", kSmallestUnitScale, kLargestUnitScale,
                             *a.unitScale));
-    require(a.dryRun || !a.output.empty(), "resample: no output given (-o out.vdb)");
+    require(a.request.dryRun || !a.request.output.empty(), "resample: no output given (-o out.vdb)");
 }
 
 RefineOptions refineOptions(const ResampleArguments& a) {
-    RefineOptions r;
+    RefineOptions r = a.request.refine;
     if (a.refine == "uniform") {
         r.criterion = Criterion::uniform;
-        require(a.resolution || a.spacing || !a.like.empty(),
+        require(a.resolution || a.spacing || !a.request.like.empty(),
                 "--refine uniform needs --resolution N, --spacing h or --like file.vdb");
     } else if (a.refine == "error") {
         r.criterion = Criterion::error;
@@ -100,16 +114,15 @@ RefineOptions refineOptions(const ResampleArguments& a) {
         r.maxError = parseNumber("--max-error", digits) * (relative ? 0.01 : 1.0);
         requirePositive("--max-error", r.maxError);
     }
-    r.brickCells = a.brickSize;
     r.resolution = a.resolution.value_or(0);
     r.spacingWorld = a.spacing.value_or(0);
-    r.samplesPerElement = a.samplesPerElement;
     r.maxLevels = a.maxLevels.value_or(0);
     r.measure = a.errorMeasure == "rms" ? ErrorMeasure::rms : ErrorMeasure::max;
     if (!a.maxVoxels.empty()) r.maxVoxels = parseCount("--max-voxels", a.maxVoxels, false);
     if (!a.common.reader.maxMemory.empty())
         r.maxMemoryBytes = parseCount("--max-memory", a.common.reader.maxMemory, true);
     if (!a.bounds.empty()) r.boundsWorld = parseBounds(a.bounds);
+    r.bind = bindOptions(a.algorithm);
     return r;
 }
 
@@ -117,18 +130,19 @@ const OutputFormat& outputFormat(const ResampleArguments& a) {
     std::vector<std::string> kinds;
     for (const OutputFormat& format : outputFormats()) kinds.emplace_back(format.name);
     // A dry run needs no output.
-    const std::string kind = chooseFormat(a.output.empty() ? kStandardOutput : a.output, a.format, kinds);
+    const std::string kind =
+        chooseFormat(a.request.output.empty() ? kStandardOutput : a.request.output, a.format, kinds);
     return *std::find_if(outputFormats().begin(), outputFormats().end(),
                          [&](const OutputFormat& format) { return kind == format.name; });
 }
 
 VdbLayout chooseLayout(const ResampleArguments& a, const OutputFormat& format) {
     require(
-        format.holdsLevels || a.layout != "levels",
+        format.holdsLevels || a.file.layout != "levels",
         fmt::format("--layout levels: a .{} file ({}) holds one grid a field, at one spacing; a .vdb file "
                     "holds levels",
                     format.name, format.title));
-    if (!a.layout.empty()) return a.layout == "flat" ? VdbLayout::flat : VdbLayout::levels;
+    if (!a.file.layout.empty()) return a.file.layout == "flat" ? VdbLayout::flat : VdbLayout::levels;
     return format.holdsLevels ? VdbLayout::levels : VdbLayout::flat;
 }
 
@@ -148,39 +162,47 @@ BindOptions bindOptions(const AlgorithmArguments& a) {
     return options;
 }
 
-std::string lossyFormat(const BindOptions& options) {
-    return options.format == SampleFormat::r32f ? std::string() : std::string(nameOf(options.format));
+std::optional<RepairOptions> repairOptions(const RepairArguments& a) {
+    if (!a.repair) return std::nullopt;
+    RepairOptions options;
+    if (a.aspect) options.limits.minAspect = *a.aspect;
+    if (a.angle) options.limits.maxDihedralDegrees = *a.angle;
+    if (!a.maxVolumeLoss.empty())
+        options.maxVolumeLoss = parseShare("--repair-max-volume-loss", a.maxVolumeLoss);
+    return options;
 }
 
-ResampleSettings checkedSettings(const ResampleArguments& a) {
+ResampleRequest resampleRequest(const ResampleArguments& typed) {
+    ResampleArguments a = typed;
+    a.file = settleProgram(a.request.program, a.file);
     checkRanges(a);
-    ResampleSettings s;
-    s.refine = refineOptions(a);
-    if (!a.fields.empty()) s.fields = parseFields(a.fields);
+    ResampleRequest r = a.request;
+    if (!a.times.empty()) r.times = parseTimes(a.times);
+    r.algorithm = a.algorithm.name;
+    r.refine = refineOptions(a);
+    if (!a.fields.empty()) r.fields = parseFields(a.fields);
     if (!a.errorFields.empty()) {
         require(a.refine == "error", "--error-field needs --refine error");
-        for (const FieldChoice& choice : parseFields(a.errorFields)) s.errorFields.push_back(choice.source);
+        for (const FieldChoice& choice : parseFields(a.errorFields)) r.errorFields.push_back(choice.source);
     }
-    s.format = &outputFormat(a);
-    s.write.layout = chooseLayout(a, *s.format);
-    s.write.halfFloat = a.half;
-    s.write.background = float(a.background.value_or(0));
-    if (a.background) s.write.hiddenValue = float(*a.background);
-    s.write.upAxis = a.upAxis == "y" ? UpAxis::y : a.upAxis == "z" ? UpAxis::z : UpAxis::keep;
-    s.write.voxelShift = a.voxelShift.value_or(0);
-    s.write.unitScale = a.unitScale.value_or(0);
-    s.shape.layout = s.write.layout;
-    s.shape.layers = a.extendLayers.value_or(s.write.layout == VdbLayout::flat ? 1 : 0);
-    s.shape.halfFloat = a.half;
-    s.shape.boundsWorld = s.refine.boundsWorld;
-    s.shape.maxFlatVoxels = s.refine.maxVoxels;
-    s.refine.bind = bindOptions(a.algorithm);
-    s.write.algorithm = a.algorithm.name;
-    s.write.sampleFormat = lossyFormat(s.refine.bind);
-    s.write.criterion = a.refine;
-    s.write.maxVoxels = s.refine.maxVoxels;
-    s.format->check(s.write);
-    return s;
+    r.format = &outputFormat(a);
+    r.write.layout = chooseLayout(a, *r.format);
+    r.write.background = float(a.background.value_or(0));
+    if (a.background) r.write.hiddenValue = float(*a.background);
+    r.write.upAxis = a.file.upAxis == "y" ? UpAxis::y : a.file.upAxis == "z" ? UpAxis::z : UpAxis::keep;
+    r.write.voxelShift = a.file.voxelShift.value_or(0);
+    r.write.unitScale = a.unitScale.value_or(0);
+    r.write.sampleFormat = lossyFormat(r.refine.bind);
+    r.write.criterion = a.refine;
+    r.write.maxVoxels = r.refine.maxVoxels;
+    r.shape.layout = r.write.layout;
+    r.shape.layers = a.file.extendLayers.value_or(r.write.layout == VdbLayout::flat ? 1 : 0);
+    r.shape.halfFloat = r.write.halfFloat;
+    r.shape.boundsWorld = r.refine.boundsWorld;
+    r.shape.maxFlatVoxels = r.refine.maxVoxels;
+    r.format->check(r.write);
+    r.repair = repairOptions(a.repair);
+    return r;
 }
 
 std::int64_t parseCount(const std::string& option, const std::string& text, bool binary) {

@@ -6,12 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "refine/refine.h"
-#include "refine/refine_options.h"
+#include "job/field_selection.h"
+#include "job/program_presets.h"
+#include "job/resample_request.h"
+#include "mesh/repair.h"
 #include "tessera/vec.h"
-#include "vdb/output_formats.h"
-#include "vdb/shape_output.h"
-#include "vdb/vdb_file.h"
 
 namespace tessera {
 
@@ -31,13 +30,6 @@ struct CommonOptions {
     ReaderArguments reader;
 };
 
-/// One entry of --field: a field of the mesh and the name of its grid.
-struct FieldChoice {
-    std::string source;
-    std::string name;
-    bool named = false;  ///< the name was given
-};
-
 /// The resampler and what it runs with, as typed.
 struct AlgorithmArguments {
     std::string name = "software";
@@ -52,41 +44,22 @@ struct RepairArguments {
     std::string maxVolumeLoss;  ///< empty: the default
 };
 
-/// The words of `tessera resample`, as typed.
+/// What was typed behind `tessera resample`: words that are still to be parsed, and what is taken as it is.
 struct ResampleArguments {
     CommonOptions common;
-    std::vector<std::string> inputs;  ///< meshes, patterns, or a .pvd file
-    std::string output, times;        ///< times: "a:b"; empty: all
-    std::string format;               ///< of standard output; empty: the default
-    std::string refine = "element-size", errorMeasure = "max";
-    std::string program;  ///< of --for; empty: none
-    std::string layout;   ///< empty: levels where the output's format can hold them, else flat
-    std::string upAxis;   ///< empty until settleProgram: not given
-    std::optional<double> voxelShift;
     AlgorithmArguments algorithm;
     RepairArguments repair;
+    ProgramChoices file;
+    std::string format;  ///< of standard output; empty: the default
+    std::string refine = "element-size", errorMeasure = "max";
+    std::string times;  ///< "a:b"; empty: all
+    std::string fields, errorFields, bounds, maxVoxels;
     std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;
     std::optional<std::string> maxError;
-    double samplesPerElement = 2;
-    int brickSize = 16;
-    std::optional<int> extendLayers;   ///< not given: 1 for the flat layout, 0 for levels
     std::optional<double> background;  ///< not given: 0, in a .vti file what writeVti says
     std::optional<double> unitScale;   ///< not given: 1, or a power of ten when voxels are tiny
-    int timeStep = -1;
-    std::string fields, errorFields, bounds, like, maxVoxels;
-    bool half = false;
-    bool dryRun = false;
-};
-
-/// The same, checked and converted; what depends on the mesh (field indices) is still missing.
-struct ResampleSettings {
-    RefineOptions refine;
-    const OutputFormat* format = nullptr;  ///< of the output
-    VdbWriteOptions write;
-    OutputShape shape;
-    std::vector<FieldChoice> fields;       ///< empty: all
-    std::vector<std::string> errorFields;  ///< empty: all chosen point fields
+    ResampleRequest request;
 };
 
 /// For commands that were given no mesh to read: throws InputError when there are bounds on reading one.
@@ -94,11 +67,11 @@ struct ResampleSettings {
 void refuseReaderBounds(const ReaderArguments& arguments, const std::string& why);
 
 BindOptions bindOptions(const AlgorithmArguments& arguments);
-/// The format's name when it isn't r32f, which loses nothing; else empty.
-std::string lossyFormat(const BindOptions& options);
+/// None without --repair. Throws InputError for values out of range.
+std::optional<RepairOptions> repairOptions(const RepairArguments& arguments);
 
 /// Throws InputError naming the option, what was expected and what came.
-ResampleSettings checkedSettings(const ResampleArguments& arguments);
+ResampleRequest resampleRequest(const ResampleArguments& arguments);
 
 /// "4096", "64K", "1.5M", "2G", "1T"; decimal multiples unless `binary`. Throws InputError naming `option`.
 std::int64_t parseCount(const std::string& option, const std::string& text, bool binary);

@@ -22,7 +22,6 @@ constexpr std::chrono::milliseconds kRedraw(100);
 constexpr double kSilentMs = 250;    // shorter runs draw nothing
 constexpr double kNoGuessMs = 2000;  // from the start: what is left isn't told yet
 constexpr std::size_t kWordsWidth = 20, kWidestBar = 40, kNarrowestBar = 10;
-constexpr double kReadBytesPerMs = 20e3, kReadStartMs = 150;  // with checks and handing over
 
 std::mutex lineMutex;
 bool lineDrawn = false;
@@ -79,8 +78,8 @@ std::unique_lock<std::mutex> pauseProgress() {
     return lock;
 }
 
-std::string progressText(const std::string& step, const ProgressState& state, std::size_t width) {
-    std::string front = step.empty() ? std::string() : step + ": ";
+std::string progressText(const ProgressState& state, std::size_t width) {
+    std::string front = state.step.empty() ? std::string() : state.step + ": ";
     front += fmt::format("{:<{}}", wordsOf(state.stage), kWordsWidth);
     // 100 % is the end, and that is when the line is gone.
     const std::string percent = fmt::format("{:3.0f} %", std::floor(std::min(state.share, 0.99) * 100));
@@ -118,17 +117,6 @@ ProgressLine::~ProgressLine() {
     const auto pause = pauseProgress();
 }
 
-void ProgressLine::beginStep(const std::string& words, std::size_t number, std::size_t count, double weight,
-                             double weightAfter) {
-    run_.beginStep(weight, weightAfter);
-    const std::lock_guard lock(lineMutex);
-    step_ = fmt::format("{} {} of {}", words, number, count);
-}
-
-void ProgressLine::expectReading(double bytes) {
-    run_.expect(Stage::reading, kReadStartMs + bytes / kReadBytesPerMs);
-}
-
 void ProgressLine::drawAgain() {
     std::unique_lock lock(stopMutex_);
     try {
@@ -146,7 +134,7 @@ void ProgressLine::draw() {
     if (!state.hasBegun) return;
     if (elapsedMs < kNoGuessMs) state.leftMs = -1;
     const auto width = std::size_t(terminalWidth(STDERR_FILENO));
-    const std::string line = fmt::format("\r{}\x1b[K", progressText(step_, state, width));
+    const std::string line = fmt::format("\r{}\x1b[K", progressText(state, width));
     std::fputs(line.c_str(), stderr);
     std::fflush(stderr);
     lineDrawn = true;

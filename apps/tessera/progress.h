@@ -23,16 +23,6 @@ class ProgressLine {
     /// What work reports to; null when nothing is drawn.
     ProgressSink* sink() { return enabled_ ? &run_ : nullptr; }
 
-    /// The stages of the run, or of every step of a series.
-    void declare(std::vector<ExpectedStage> stages) { run_.declare(std::move(stages)); }
-    /// The next step of a series begins.
-    /// @param words before the step's number: "step", "looking at step"; @param number from 1.
-    /// @param weight of this step over others, @param weightAfter of all that come behind it.
-    void beginStep(const std::string& words, std::size_t number, std::size_t count, double weight,
-                   double weightAfter);
-    /// About how long reading a file of this size takes.
-    void expectReading(double bytes);
-
   private:
     void drawAgain();
     void draw();
@@ -40,7 +30,6 @@ class ProgressLine {
     bool enabled_;
     Timer clock_;
     RunProgress run_;
-    std::string step_;  // "step 3 of 20"
     std::mutex stopMutex_;
     std::condition_variable stopped_;
     bool stop_ = false;
@@ -52,7 +41,6 @@ class ProgressLine {
 std::unique_lock<std::mutex> pauseProgress();
 
 /// The line's text, at most width - 1 columns.
-/// @param step "step 3 of 20", or empty.
-std::string progressText(const std::string& step, const ProgressState& state, std::size_t width);
+std::string progressText(const ProgressState& state, std::size_t width);
 
 }  // namespace tessera

@@ -1,3 +1,5 @@
+#include "session.h"
+
 #include <fmt/format.h>
 #include <sys/auxv.h>
 #include <unistd.h>
@@ -9,13 +11,9 @@
 #include <filesystem>
 #include <string>
 
-#include "base/timer.h"
-#include "commands.h"
 #include "files/atomic_file.h"
 #include "interrupt.h"
-#include "reader/serve_mesh_reader.h"
-#include "report_text.h"
-#include "series_steps.h"
+#include "job/wrap_text.h"
 #include "terminal.h"
 #include "tessera/error.h"
 
@@ -36,6 +34,13 @@ void checkReaderOptions(const ReaderArguments& reader) {
         throw InputError("--max-memory bounds a process of its own here: --reader in-process has none");
 }
 
+void printWarning(const std::string& text) {
+    std::string line = fmt::format("tessera: warning: {}\n", singleLine(text));
+    if (::isatty(STDERR_FILENO) == 1) line = wrapLines(line, std::size_t(terminalWidth(STDERR_FILENO)));
+    const auto pause = pauseProgress();
+    std::fputs(line.c_str(), stderr);
+}
+
 }  // namespace
 
 void noteStart() {
@@ -46,48 +51,46 @@ void noteStart() {
 }
 
 Session::Session(const CommonOptions& options, const std::string& output)
-    : progress(!options.quiet),
-      quiet_(options.quiet),
+    : progress_(!options.quiet),
       strict_(options.strict),
-      prints_(!options.quiet && options.jsonPath != kStandardOutput && output != kStandardOutput),
-      isolated_(options.reader.kind == "isolated") {
-    execution.threads = options.threads;
-    execution.cancel = &interruptFlag();
-    execution.progress = progress.sink();
+      prints_(!options.quiet && options.jsonPath != kStandardOutput && output != kStandardOutput) {
+    job.execution = {options.threads, &interruptFlag(), progress_.sink()};
+    job.reportPath = options.jsonPath;
+    job.textWidth = std::size_t(outputWidth());
+    job.say = [this](const std::string& text) { print(text); };
+    // Of a result that isn't what was asked for --quiet tells too.
+    if (!options.quiet) job.warn = printWarning;
+    job.fellShort = [this](const std::string& text) {
+        fellShort_ = true;
+        printWarning(text);
+    };
     const ReaderArguments& reader = options.reader;
     checkReaderOptions(reader);
-    if (!reader.maxMemory.empty()) limits_.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
+    if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quickReaderBeside(program)};
+    if (!reader.maxMemory.empty())
+        job.readerLimits.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
     if (!reader.maxSeconds) return;
-    limits_.seconds = *reader.maxSeconds;
-    if (!std::isfinite(limits_.seconds) || limits_.seconds <= 0)
-        throw InputError(fmt::format("--max-read-time: expected a number above 0, got {}", limits_.seconds));
+    job.readerLimits.seconds = *reader.maxSeconds;
+    if (!std::isfinite(*reader.maxSeconds) || *reader.maxSeconds <= 0)
+        throw InputError(
+            fmt::format("--max-read-time: expected a number above 0, got {}", *reader.maxSeconds));
 }
 
-MeshFile Session::readMesh(const std::string& path, const ReadOptions& options) {
-    if (isCollectionName(path)) {
-        const SeriesStep step = chosenStep(path, options.timeStep);
-        return readMesh(step.files[0], readOptions(step, options.fields, -1));
-    }
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(path, error);
-    progress.expectReading(error ? 0 : double(bytes));
-    execution.report(Stage::reading, 0, 1);
-    if (!isolated_) return tessera::readMesh(path, options, execution);
-    static const std::string quick = quickReaderBeside(program);
-    MeshFile file = readMeshIsolated({program, {kReadMeshCommand}, quick}, path, options, limits_, execution);
-    readPeakBytes_ = std::max(readPeakBytes_, file.readPeakBytes);
-    return file;
-}
-
-int runReadMesh(const std::vector<std::string>& words) {
-    return serveMeshReader(words);
-}
-
-void Session::print(const std::string& text) {
+void Session::print(const std::string& text) const {
     if (!prints_) return;
     std::string shown = withoutControls(text);
     if (::isatty(STDOUT_FILENO) == 1) shown = wrapLines(shown, std::size_t(outputWidth()));
     printOut(shown);
+}
+
+void Session::writeReport(const Json& document) const {
+    if (job.reportPath.empty()) return;
+    const std::string text = documentText(document);
+    job.reportPath == kStandardOutput ? printOut(text) : writeFileAtomically(job.reportPath, text);
+}
+
+int Session::exitCode() const {
+    return strict_ && fellShort_ ? kExitFellShort : 0;
 }
 
 void printOut(const std::string& text) {
@@ -99,39 +102,6 @@ void printOut(const std::string& text) {
 
 int outputError() {
     return firstOutputError;
-}
-
-namespace {
-void printWarning(const std::string& text) {
-    std::string line = fmt::format("tessera: warning: {}\n", singleLine(text));
-    if (::isatty(STDERR_FILENO) == 1) line = wrapLines(line, std::size_t(terminalWidth(STDERR_FILENO)));
-    const auto pause = pauseProgress();
-    std::fputs(line.c_str(), stderr);
-}
-}  // namespace
-
-void Session::warn(const std::string& text) {
-    if (!quiet_) printWarning(text);
-}
-
-void Session::warnFellShort(const std::string& text) {
-    fellShort_ = true;
-    printWarning(text);
-}
-
-std::vector<std::string> Session::unsaid(const std::vector<std::string>& warnings) {
-    std::vector<std::string> fresh;
-    for (const std::string& warning : warnings)
-        if (said_.insert(warning).second) fresh.push_back(warning);
-    return fresh;
-}
-
-std::int64_t Session::peakMemoryBytes() const {
-    return std::max<std::int64_t>(tessera::peakMemoryBytes(), readPeakBytes_);
-}
-
-int Session::exitCode() const {
-    return strict_ && fellShort_ ? kExitFellShort : 0;
 }
 
 }  // namespace tessera

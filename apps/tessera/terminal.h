@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 namespace tessera {
 
 /// Columns of the terminal behind a descriptor: what it says, else COLUMNS, else 80.
@@ -9,17 +7,5 @@ int terminalWidth(int descriptor);
 
 /// Columns that text on standard output may take: those of the terminal, 80 where it is none.
 int outputWidth();
-
-/// Columns that a text in UTF-8 takes: one a character.
-std::size_t textWidth(const std::string& text);
-
-/// At most `width` columns, at least 5: a longer text loses its middle, "velocity_mag...phase_2".
-std::string shortened(const std::string& text, std::size_t width);
-
-/// Breaks a line at spaces so that it fits. A word that is longer stays whole.
-/// @param indent of what continues it.
-std::string wrapLine(const std::string& line, std::size_t width, std::size_t indent);
-/// The same for every line of a text, continued four columns further right than it begins.
-std::string wrapLines(const std::string& text, std::size_t width);
 
 }  // namespace tessera

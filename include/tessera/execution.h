@@ -2,6 +2,9 @@
 
 #include <atomic>
 #include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace tessera {
 
@@ -21,6 +24,13 @@ enum class Stage : std::uint8_t {
     writing
 };
 
+/// A stage that a run goes through, and the time that it is expected to take over that of the others. From
+/// sampling on: with one round of sampling.
+struct ExpectedStage {
+    Stage stage;
+    double weight;
+};
+
 /// Receives progress of long work. Called from any thread, for every item; must not block.
 class ProgressSink {
   public:
@@ -30,6 +40,14 @@ class ProgressSink {
     /// Sampling is about to begin, maybe anew: what it samples now, and about how much more in rounds to
     /// come. Called between stages, in units that are the same for a whole run.
     virtual void beginRound(double /*now*/, double /*later*/) {}
+    /// The stages of every step, in their order; a run that isn't a series is one step.
+    virtual void declare(std::vector<ExpectedStage> /*stages*/) {}
+    /// The next step of a series begins.
+    /// @param name such as "step 3 of 20". @param weight of the step, @param weightAfter of all the steps
+    /// behind it together.
+    virtual void beginStep(const std::string& /*name*/, double /*weight*/, double /*weightAfter*/) {}
+    /// About how long a stage takes that reports nothing; for its next time.
+    virtual void expect(Stage /*stage*/, double /*milliseconds*/) {}
 };
 
 /// How long work runs: threads, cancellation, progress. Results never depend on it.
@@ -50,6 +68,15 @@ struct Execution {
     }
     void beginRound(double now, double later) const {
         if (progress) progress->beginRound(now, later);
+    }
+    void declare(std::vector<ExpectedStage> stages) const {
+        if (progress) progress->declare(std::move(stages));
+    }
+    void beginStep(const std::string& name, double weight, double weightAfter) const {
+        if (progress) progress->beginStep(name, weight, weightAfter);
+    }
+    void expect(Stage stage, double milliseconds) const {
+        if (progress) progress->expect(stage, milliseconds);
     }
     /// For the parts of work whose progress the caller reports itself.
     Execution withoutProgress() const { return {threads, cancel, nullptr}; }

@@ -44,8 +44,9 @@ void RunProgress::expect(Stage stage, double milliseconds) {
     expectedMs_ = milliseconds;
 }
 
-void RunProgress::beginStep(double weight, double weightAfter) {
+void RunProgress::beginStep(const std::string& name, double weight, double weightAfter) {
     const std::lock_guard lock(mutex_);
+    stepName_ = name;
     const double now = clock_();
     latest_ = kNoStage;
     if (hasStep_) {
@@ -186,7 +187,7 @@ ProgressState RunProgress::state() {
     const double part = fraction(now);
     const double step = std::min(1.0, stageBase_ + stageSpan_ * part);
     shown_ = std::clamp(stepBase_ + stepSpan_ * step, shown_, 1.0);
-    ProgressState state{inStage_ || shown_ > 0, stage_, shown_, leftInStepMs(now, part)};
+    ProgressState state{inStage_ || shown_ > 0, stage_, shown_, leftInStepMs(now, part), stepName_};
     if (weightAfter_ <= 0) return state;
     // A series: earlier steps tell how long one takes, or else this one.
     const double thisMs = now - stepBeginMs_;

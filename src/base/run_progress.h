@@ -4,18 +4,12 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "tessera/execution.h"
 
 namespace tessera {
-
-/// A stage that a run goes through, and the time that it is expected to take over that of the others. From
-/// sampling on: with one round of sampling.
-struct ExpectedStage {
-    Stage stage;
-    double weight;
-};
 
 /// Where a run stands.
 struct ProgressState {
@@ -23,6 +17,7 @@ struct ProgressState {
     Stage stage = Stage::reading;
     double share = 0;    ///< of the whole run, 0 to 1; never smaller than before
     double leftMs = -1;  ///< time until the end; below 0: not known yet
+    std::string step;    ///< of a series: the name of the step at hand
 };
 
 /// Makes one share of a whole run out of what its stages report. What isn't known ahead is estimated; a wrong
@@ -33,14 +28,10 @@ class RunProgress : public ProgressSink {
     using Clock = std::function<double()>;  ///< milliseconds
     explicit RunProgress(Clock clock);
 
-    /// The stages of every step, in their order; a run that isn't a series is one step. A stage that isn't
-    /// named here takes no share.
-    void declare(std::vector<ExpectedStage> stages);
-    /// The next step begins.
-    /// @param weight of the step, @param weightAfter of all the steps behind it together.
-    void beginStep(double weight, double weightAfter);
-    /// About how long a stage takes that reports nothing; for its next time.
-    void expect(Stage stage, double milliseconds);
+    /// A stage that isn't named here takes no share.
+    void declare(std::vector<ExpectedStage> stages) override;
+    void beginStep(const std::string& name, double weight, double weightAfter) override;
+    void expect(Stage stage, double milliseconds) override;
 
     void update(Stage stage, std::int64_t done, std::int64_t total) override;
     void beginRound(double now, double later) override;
@@ -76,6 +67,7 @@ class RunProgress : public ProgressSink {
     // Steps.
     double stepBase_ = 0, stepSpan_ = 1, stepWeight_ = 1, weightAfter_ = 0, stepBeginMs_ = 0;
     bool hasStep_ = false;
+    std::string stepName_;
     double pastWeight_ = 0, pastMs_ = 0;  ///< of earlier steps of the same weight
     double shown_ = 0;
 };

@@ -109,14 +109,8 @@ struct ColourRange {
 
 ColourRange chooseRange(const ScalarImage& image, const PictureOptions& options) {
     if (options.min < options.max) return {options.min, options.max};
-    ColourRange range{HUGE_VAL, -HUGE_VAL};
-    for (std::size_t i = 0; i < image.values.size(); ++i) {
-        const double value = double(image.values[i]);
-        if (!image.coverage[i] || !std::isfinite(value)) continue;
-        range.min = std::min(range.min, value);
-        range.max = std::max(range.max, value);
-    }
-    return range.min <= range.max ? range : ColourRange{0, 0};
+    const ValueRange range = shownRange(image.values, image.coverage);
+    return range.empty() ? ColourRange{} : ColourRange{range.min, range.max};
 }
 
 // Labels of evenly spaced ticks, with the fewest digits that tell them apart.
@@ -172,6 +166,17 @@ void drawBar(RgbImage& canvas, int left, int top, int height, const std::vector<
 }
 
 }  // namespace
+
+ValueRange shownRange(std::span<const float> values, std::span<const std::uint8_t> coverage) {
+    ValueRange range;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const double value = double(values[i]);
+        if (!coverage[i] || !std::isfinite(value)) continue;
+        range.min = std::min(range.min, value);
+        range.max = std::max(range.max, value);
+    }
+    return range;
+}
 
 Rgb mapColour(double share) {
     static const std::vector<Rgb> table = [] {

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "brick/seams.h"
+#include "mesh/field_range.h"
 #include "tessera/execution.h"
+#include "tessera/mesh.h"
 
 namespace tessera {
 
@@ -20,6 +23,9 @@ struct ScalarImage {
 
     std::size_t offset(int x, int y) const { return std::size_t(y) * std::size_t(width) + std::size_t(x); }
 };
+
+/// Range of the finite values where there is coverage.
+ValueRange shownRange(std::span<const float> values, std::span<const std::uint8_t> coverage);
 
 /// 8 bits of red, green and blue a pixel, row by row from the top left.
 struct RgbImage {

@@ -1,0 +1,110 @@
+#include "commands.h"
+
+#include <fmt/format.h>
+
+#include "job/resample_files.h"
+#include "session.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kExitDisagree = 1;
+
+CutOptions cutOptions(const SliceArguments& a) {
+    CutOptions options = a.request.cut;
+    if (!a.origin.empty()) options.originWorld = parseVector("--origin", a.origin);
+    options.normal = parseVector("--normal", a.normal);
+    if (!a.up.empty()) options.up = parseVector("--up", a.up);
+    if (!a.size.empty()) {
+        const bool square = a.size.find(',') == std::string::npos;
+        const std::vector<double> size = parseNumbers("--size", a.size, square ? 1 : 2);
+        options.sizeWorld = {size.front(), size.back()};
+    }
+    checkCutOptions(options);
+    return options;
+}
+
+}  // namespace
+
+int runResample(const ResampleArguments& a) {
+    const ResampleRequest request = resampleRequest(a);
+    Session session(a.common, request.dryRun ? std::string() : request.output);
+    session.writeReport(resampleFiles(request, session.job));
+    return session.exitCode();
+}
+
+int runInfo(const InfoArguments& a) {
+    DescribeRequest request = a.request;
+    if (request.paths.size() == 1 && isVdbName(request.paths[0]))
+        refuseReaderBounds(a.common.reader, request.paths[0] + " is no mesh");
+    request.repair = repairOptions(a.repair);
+    Session session(a.common);
+    session.writeReport(describeFiles(request, session.job));
+    return 0;
+}
+
+int runVerify(const VerifyArguments& a) {
+    Session session(a.common);
+    const Verification verification = verifyFile(a.request, session.job);
+    session.writeReport(verifyJson(a.request, verification));
+    if (!verification.holds())
+        throw InputError(
+            fmt::format("{}: its claims do not hold for {}", a.request.vdbPath, a.request.meshPath));
+    return 0;
+}
+
+int runTets(const TetsArguments& a) {
+    TetsRequest request = a.request;
+    request.repair = repairOptions(a.repair);
+    Session session(a.common, request.output);
+    session.writeReport(tetsJson(request, exportTets(request, session.job)));
+    return 0;
+}
+
+int runPicture(const PictureArguments& a) {
+    DrawRequest request = a.request;
+    if (request.mesh.empty()) refuseReaderBounds(a.common.reader, "without --mesh there is none to be read");
+    request.axis = a.axis == "x" ? 0 : a.axis == "y" ? 1 : 2;
+    if (!a.bounds.empty()) request.boundsWorld = parseBounds(a.bounds);
+    if (!a.range.empty()) request.range = parseRange("--range", a.range);
+    Session session(a.common, request.output);
+    session.writeReport(drawnJson(request, drawVdb(request, session.job)));
+    return 0;
+}
+
+int runSlice(const SliceArguments& a) {
+    CutRequest request = a.request;
+    request.cut = cutOptions(a);
+    request.algorithm = a.algorithm.name;
+    request.bind = bindOptions(a.algorithm);
+    if (!a.fields.empty()) request.fields = parseFields(a.fields);
+    if (!a.range.empty()) request.range = parseRange("--range", a.range);
+    request.repair = repairOptions(a.repair);
+    Session session(a.common, request.output);
+    session.writeReport(cutJson(request, cutMesh(request, session.job), session.job));
+    return 0;
+}
+
+int runCompare(const CompareArguments& a) {
+    CompareRequest request = a.request;
+    request.bind = bindOptions(a.algorithm);
+    if (!a.fields.empty()) request.fields = parseFields(a.fields);
+    request.repair = repairOptions(a.repair);
+    Session session(a.common);
+    const Comparison comparison = compareMeshes(request, session.job);
+    session.writeReport(comparisonJson(comparison, session.job));
+    for (const std::string& problem : comparison.problems) session.job.fellShort(problem);
+    return comparison.problems.empty() ? 0 : kExitDisagree;
+}
+
+int runPaperTables(const PaperTablesArguments& a) {
+    PaperTablesRequest request = a.request;
+    request.bind = bindOptions(a.algorithm);
+    Session session(a.common);
+    session.writeReport(makePaperTables(request, session.job));
+    return 0;
+}
+
+}  // namespace tessera

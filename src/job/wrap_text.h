@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+namespace tessera {
+
+/// Columns of text where nothing says how many there are.
+inline constexpr std::size_t kUsualTextWidth = 80;
+
+/// Columns that a text in UTF-8 takes: one a character.
+std::size_t textWidth(const std::string& text);
+
+/// At most `width` columns, at least 5: a longer text loses its middle, "velocity_mag...phase_2".
+std::string shortened(const std::string& text, std::size_t width);
+
+/// Breaks a line at spaces so that it fits. A word that is longer stays whole.
+/// @param indent of what continues it.
+std::string wrapLine(const std::string& line, std::size_t width, std::size_t indent);
+/// The same for every line of a text, continued four columns further right than it begins.
+std::string wrapLines(const std::string& text, std::size_t width);
+
+/// Names in a file may hold what a terminal obeys: control characters become spaces, but for line ends.
+std::string withoutControls(std::string text);
+/// The same with line ends as spaces too, and no space at the end.
+std::string singleLine(std::string text);
+
+}  // namespace tessera

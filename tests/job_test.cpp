@@ -1,0 +1,98 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <sstream>
+
+#include "job/describe_files.h"
+#include "job/resample_files.h"
+#include "job/verify_file.h"
+#include "tessera/error.h"
+
+namespace tessera {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string kMesh = std::string(TESSERA_DATA_DIR) + "/ccx-cavity/cavity.vtu";
+
+/// A job without a terminal: what it tells is kept.
+class JobTest : public testing::Test {
+  protected:
+    JobTest() : folder_(fs::path(testing::TempDir()) / ("job_test_" + std::to_string(::getpid()))) {
+        fs::create_directories(folder_);
+        job.say = [this](const std::string& text) { said += text; };
+        job.fellShort = [this](const std::string& text) { shortfalls.push_back(text); };
+    }
+    ~JobTest() override { fs::remove_all(folder_); }
+
+    ResampleRequest request() const {
+        ResampleRequest request;
+        request.inputs = {kMesh};
+        request.output = file("out.vdb");
+        request.format = &outputFormats().front();
+        request.refine.criterion = Criterion::uniform;
+        request.refine.resolution = 16;
+        request.write.criterion = "uniform";
+        return request;
+    }
+    std::string file(const std::string& name) const { return (folder_ / name).string(); }
+
+    Job job;
+    std::string said;
+    std::vector<std::string> shortfalls;
+
+  private:
+    fs::path folder_;
+};
+
+TEST_F(JobTest, writesAFileThatVerifies) {
+    const ResampleRequest request = this->request();
+    const Json document = resampleFiles(request, job);
+    EXPECT_EQ(document["output"], request.output);
+    EXPECT_EQ(document["write"]["file_bytes"], fs::file_size(request.output));
+    EXPECT_NE(said.find(request.output), std::string::npos);
+    EXPECT_TRUE(shortfalls.empty());
+    const Verification verification = verifyFile({kMesh, request.output}, job);
+    EXPECT_TRUE(verification.holds());
+    EXPECT_EQ(verification.voxels.samples.covered, document["voxels"]["covered_total"]);
+}
+
+TEST_F(JobTest, tellsWhatFellShort) {
+    ResampleRequest request = this->request();
+    request.dryRun = true;
+    request.refine = {};
+    request.refine.criterion = Criterion::error;
+    request.refine.maxError = 1e-9;
+    request.refine.maxVoxels = 100000;
+    const Json document = resampleFiles(request, job);
+    ASSERT_EQ(shortfalls.size(), 1u);
+    EXPECT_NE(shortfalls[0].find("not within the bound"), std::string::npos);
+    EXPECT_TRUE(document["output"].is_null());
+    EXPECT_FALSE(fs::exists(request.output));
+}
+
+TEST_F(JobTest, leavesNothingWhenItIsCancelled) {
+    const std::atomic<bool> stop = true;
+    job.execution.cancel = &stop;
+    EXPECT_THROW(resampleFiles(request(), job), Cancelled);
+    EXPECT_FALSE(fs::exists(request().output));
+}
+
+TEST_F(JobTest, writesNothingWhereItsDocumentWillStand) {
+    job.reportPath = request().output;
+    EXPECT_THROW(resampleFiles(request(), job), InputError);
+}
+
+TEST_F(JobTest, tablesKeepToTheirWidth) {
+    job.textWidth = 44;
+    describeFiles({{kMesh}, -1, {}, false}, job);
+    std::istringstream lines(said.substr(said.find("  field")));
+    std::size_t count = 0;
+    for (std::string line; std::getline(lines, line); ++count) EXPECT_LE(line.size(), 44u) << line;
+    EXPECT_GT(count, 2u);
+}
+
+}  // namespace
+}  // namespace tessera
