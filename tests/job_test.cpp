@@ -64,8 +64,8 @@ TEST_F(JobTest, tellsWhatFellShort) {
     request.dryRun = true;
     request.refine = {};
     request.refine.criterion = Criterion::error;
-    request.refine.maxError = 1e-9;
-    request.refine.maxVoxels = 100000;
+    request.refine.maxError = 1e-5;
+    request.refine.maxVoxels = 400000;
     const Json document = resampleFiles(request, job);
     ASSERT_EQ(shortfalls.size(), 1u);
     EXPECT_NE(shortfalls[0].find("not within the bound"), std::string::npos);
