@@ -34,8 +34,8 @@ struct BrickField {
 };
 
 /// The samples of a mesh in bricks of several levels, with their measured error and what they were made of.
-/// The mesh must outlive them and stay unchanged. A copy has samples of its own. Several threads may read at
-/// once.
+/// The mesh must outlive them, unchanged and where it is. A copy has samples of its own. Several threads may
+/// read at once.
 class Bricks {
   public:
     Bricks(const Bricks& other);
