@@ -2,14 +2,15 @@ set(TESSERA_PYTHON /usr/bin/python3 CACHE FILEPATH "Python with Debian's modules
 add_test(NAME layering_test COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.py)
 
 if(TARGET tessera)
-  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Slices Series Compare Reader Terminal Help)
+  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Programs Slices Series Compare Reader Terminal Help)
     add_test(NAME app_test.${suite}
-      COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app_test.py --tessera $<TARGET_FILE:tessera>
+      COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
   endforeach()
   # An algorithm from outside src/: two files and one registration.
-  tessera_program(tessera_with_oracle SOURCES ${PROJECT_SOURCE_DIR}/apps/tessera/main.cpp register_oracle.cpp oracle_resampler.cpp
+  tessera_program(tessera_with_oracle SOURCES ${PROJECT_SOURCE_DIR}/apps/tessera/main.cpp app/register_oracle.cpp contract/oracle_resampler.cpp
     LINK reference PRIVATE_LINK tessera_app)
+  target_include_directories(tessera_with_oracle PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
   add_test(NAME own_algorithm_test
     COMMAND tessera_with_oracle compare ${PROJECT_SOURCE_DIR}/data/ccx-cavity/cavity.vtu --algorithms software,oracle --resolution 16)
   # Short runs; docs/testing.md tells of the long ones.
@@ -17,7 +18,7 @@ if(TARGET tessera)
     COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera> --count 60 --seed 1
             --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutants)
   add_test(NAME kill_test
-    COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
+    COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
             --count 20 --seed 1)
   set_tests_properties(mutated_meshes kill_test PROPERTIES PROCESSORS 2)
   add_test(NAME random_plans
@@ -28,7 +29,7 @@ if(TARGET tessera)
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/external/check_against_vtk.py --tessera $<TARGET_FILE:tessera>
               ${PROJECT_SOURCE_DIR}/data ${PROJECT_SOURCE_DIR}/../shared/data)
     add_test(NAME install_test
-      COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/install_test.py ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
+      COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/install_test.py ${PROJECT_BINARY_DIR} ${PROJECT_SOURCE_DIR})
   endif()
 endif()
 

@@ -1,1 +1,1 @@
-tessera_test(compare_test LINK compare reference registry)
+tessera_test(compare_test FOLDER compare LINK compare reference registry)

@@ -1,11 +1,11 @@
 foreach(name plan shape generator)
-  tessera_test(raster_${name}_test OPTIMISED LINK reference registry)
+  tessera_test(raster_${name}_test FOLDER raster OPTIMISED LINK reference registry)
   list(APPEND raster_tests raster_${name}_test)
 endforeach()
 # Thread sanitizers have no place for the drivers of these.
 if(NOT TESSERA_SANITIZE MATCHES thread)
   foreach(name run sceptic)
-    tessera_test(raster_${name}_test OPTIMISED LINK reference registry PRIVATE_LINK contract_suite)
+    tessera_test(raster_${name}_test FOLDER raster OPTIMISED LINK reference registry PRIVATE_LINK contract_suite)
     list(APPEND raster_tests raster_${name}_test)
   endforeach()
 endif()

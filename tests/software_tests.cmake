@@ -1,2 +1,2 @@
-tessera_test(software_test OPTIMISED LINK software registry)
-tessera_test(registry_test LINK registry)
+tessera_test(software_test FOLDER software OPTIMISED LINK software registry)
+tessera_test(registry_test FOLDER software LINK registry)

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "../contract_suite.h"
+#include "contract_suite.h"
 
 // The gallery: meshes, lattices and fields that break other tools, each with a name and a sentence.
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "../contract_suite.h"
+#include "contract_suite.h"
 
 namespace tessera::hard_cases {
 

@@ -1,6 +1,6 @@
 // Adds the oracle to the algorithms of the program that this is linked into.
 
-#include "oracle_resampler.h"
+#include "contract/oracle_resampler.h"
 #include "tessera/registry.h"
 
 namespace {
