@@ -88,6 +88,10 @@ def main():
         text = run(programs / "flow", folder=work)
         expect(text, r"^pressure: off by at most [\d.e+-]+$", r"^velocity: off by at most [\d.e+-]+$")
         verify("flow.vtu", "flow.vdb")
+        run(tessera, "resample", "flow.vtu", "-o", "same.vdb", "--refine", "error", "--max-error", "5%", "--field", "pressure,velocity", "-q",
+            folder=work)
+        if (work / "flow.vdb").read_bytes() != (work / "same.vdb").read_bytes():
+            sys.exit("the program and the command line write different files")
         expect(run(tessera, "info", "flow.vdb", folder=work), "flow.vtu", "software", "error", "pressure", "velocity")
 
         expect(run(programs / "progress", folder=work), r"^[1-9]\d* bricks, [1-9]\d* calls$",
