@@ -7,6 +7,9 @@ target_compile_options(tessera_flags INTERFACE
 if(TESSERA_SANITIZE)
   target_compile_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
+  if(TESSERA_SANITIZE_LESS)
+    target_compile_options(tessera_flags INTERFACE -fno-sanitize=${TESSERA_SANITIZE_LESS})
+  endif()
   target_link_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE})
 endif()
 

@@ -38,7 +38,7 @@ endif()
 set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine seams measure extend oracle
   contract_checker contract_format contract_test hard_cases perturbed vdb vti image library)
 if(TESSERA_SANITIZE MATCHES thread)
-  set(sanitized_areas base gl_test compare software contract_test brick refine seams measure)
+  set(sanitized_areas base gl_test compare software contract_test brick_store refine seams measure)
 endif()
 list(JOIN sanitized_areas "|" sanitized_areas)
 get_property(tests_here DIRECTORY PROPERTY TESTS)

@@ -42,8 +42,15 @@ if(TARGET contract_data_test)
 endif()
 tessera_split_device_tests(${on_devices})
 if(TESSERA_SANITIZE MATCHES address)
-  # The same arithmetic over and over for the same bits: left to the thread sanitizer and the release build.
-  set_tests_properties(contract_test PROPERTIES ENVIRONMENT "GTEST_FILTER=-*SameBits*:*Slicing*:*Hybrid*")
+  # One mesh of each kind: what a case adds in arithmetic is checked in the release build, as are the same bits always.
+  set(cases "")
+  foreach(mesh TurnedJitteredBox BoxFarFromTheOrigin GradedDelaunay TurnedBoundaryLayers ThinTetsOfAspect1e12 NeedleClusterOfAspect1e10
+               TetsWithIntegerNodes OverlappingTets FlatAndInvertedElements ManyElementsInOneVoxel HangingNodes TurnedStackedBoxes
+               ElementsOfSizesFarApart TurnedPlateFarThinnerThanAVoxel)
+    list(APPEND cases "*WrongValues/Software*On${mesh}")
+  endforeach()
+  list(JOIN cases ":" cases)
+  set_tests_properties(contract_test PROPERTIES ENVIRONMENT "GTEST_FILTER=${cases}:*ContractOf*Software*")
 elseif(TESSERA_SANITIZE MATCHES thread)
   # What runs on several threads; the oracle doesn't.
   set_tests_properties(contract_test PROPERTIES
