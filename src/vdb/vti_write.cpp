@@ -299,7 +299,7 @@ std::string headerText(ImageParts& parts, const PointBox& box, const Vec3d& orig
                 text += " NumberOfComponents=\"" + std::to_string(array.components) + "\"";
             text += " format=\"appended\" offset=\"";
             array.offsetAt = text.size();
-            text += std::string(kOffsetDigits, '0') + "\"/>\n";
+            text.append(kOffsetDigits, '0').append("\"/>\n");
         }
     };
     text += "<FieldData>\n";
