@@ -206,10 +206,14 @@ TEST_P(HardCaseHashes, AreThoseListed) {
     };
     std::vector<Way> ways;
     for (const std::string& target : software.targets()) ways.push_back({target, 2, 32});
-    for (const int threads : {1, 2, 5, 16}) ways.push_back({software.targets().front(), threads, 16});
-    for (const int edge : {8, 64})
-        for (const Route route : {Route::pass, Route::index})
-            ways.push_back({software.targets().front(), 5, edge, route});
+    if (contract::isHurried()) {
+        ways.push_back({software.targets().front(), 5, 8, Route::index});
+    } else {
+        for (const int threads : {1, 2, 5, 16}) ways.push_back({software.targets().front(), threads, 16});
+        for (const int edge : {8, 64})
+            for (const Route route : {Route::pass, Route::index})
+                ways.push_back({software.targets().front(), 5, edge, route});
+    }
 
     const std::vector<LatticeCase> coarse = latticesOf(mesh, 16);
     std::vector<LatticeCase> lattices{coarse.front(), coarse.back()};
