@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3 -B
 """Random plans from outside: seeded runs of `tessera resample` whose files are read with pyopenvdb and checked against the mesh in numpy.
 
 usage: random_plans.py --tessera PROGRAM [--seeds 1-25] [--jobs N] [--keep FOLDER] [--algorithms software,slicing,hybrid]
