@@ -1,37 +1,13 @@
 #include "job/field_selection.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <numeric>
 #include <set>
 
-#include "mesh_files/read_mesh.h"
-#include "tessera/error.h"
+#include "mesh_files/find_field.h"
 
 namespace tessera {
 
 namespace {
-
-int findAmong(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name) {
-    int found = -1;
-    for (const int f : fields) {
-        const Field& field = mesh.fields[std::size_t(f)];
-        if (isFieldCalled(name, field.name, field.location) &&
-            (found < 0 || field.location == FieldLocation::point))
-            found = f;
-    }
-    if (found >= 0) return found;
-    std::string there;
-    for (const int f : fields) there += (there.empty() ? "" : ", ") + mesh.fields[std::size_t(f)].name;
-    throw InputError(fmt::format("no field named '{}'; there are: {}", name, there.empty() ? "none" : there));
-}
-
-std::vector<int> everyField(const TetMesh& mesh) {
-    std::vector<int> all(mesh.fields.size());
-    std::iota(all.begin(), all.end(), 0);
-    return all;
-}
 
 std::string gridName(const TetMesh& mesh, const Field& field, std::set<std::string>& taken) {
     std::string name = field.name;
@@ -70,7 +46,7 @@ FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>&
     };
     const std::vector<int> all = everyField(mesh);
     for (const FieldChoice& choice : choices) {
-        const int f = findAmong(mesh, all, choice.source);
+        const int f = findField(mesh, all, choice.source);
         add(f, choice.name == choice.source ? mesh.fields[std::size_t(f)].name : choice.name);
     }
     if (choices.empty())
@@ -84,10 +60,6 @@ int findSource(const TetMesh& mesh, const OutputField& output) {
                (field.location == FieldLocation::point) == (output.location == "point");
     });
     return found == mesh.fields.end() ? -1 : int(found - mesh.fields.begin());
-}
-
-int findSelected(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name) {
-    return findAmong(mesh, fields, name);
 }
 
 }  // namespace tessera

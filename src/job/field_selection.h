@@ -35,7 +35,4 @@ FieldSelection selectFields(const TetMesh& mesh, const std::vector<FieldChoice>&
 /// place and number of components.
 int findSource(const TetMesh& mesh, const OutputField& output);
 
-/// Index into mesh.fields for a name as above, among `fields`. Throws InputError.
-int findSelected(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name);
-
 }  // namespace tessera

@@ -9,6 +9,7 @@
 #include "job/memory_plan.h"
 #include "job/program_presets.h"
 #include "job/report_text.h"
+#include "mesh_files/find_field.h"
 #include "refine/measure_error.h"
 #include "refine/plan.h"
 #include "refine/refine.h"
@@ -103,7 +104,7 @@ StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request) {
         plan.shape.maxFlatBytes = budget.flatBytes;
     }
     for (const std::string& name : request.errorFields)
-        plan.refine.errorFields.push_back(findSelected(mesh, plan.selection.fields, name));
+        plan.refine.errorFields.push_back(findField(mesh, plan.selection.fields, name));
     return plan;
 }
 

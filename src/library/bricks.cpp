@@ -1,4 +1,5 @@
 #include "tessera/bricks.h"
+#include "mesh_files/find_field.h"
 
 #include <cmath>
 #include <utility>
@@ -30,7 +31,7 @@ RefineOptions refineOptions(const TetMesh& mesh, const ChosenFields& chosen, con
     refine.maxErrorIsRelative = options.maxErrorIsRelative;
     refine.measure = options.errorMeasure;
     for (const std::string& name : options.errorFields)
-        refine.errorFields.push_back(chosenField(mesh, chosen.fields, name));
+        refine.errorFields.push_back(findField(mesh, chosen.fields, name));
     refine.maxVoxels = options.maxVoxels;
     refine.maxMemoryBytes = options.maxMemoryBytes;
     refine.boundsWorld = options.boundsWorld;

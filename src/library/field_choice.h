@@ -21,7 +21,4 @@ struct ChosenFields {
 /// twice.
 ChosenFields chooseFields(const TetMesh& mesh, const std::vector<std::string>& names);
 
-/// Index into mesh.fields for a name among chosen ones. Throws InputError, listing them, when there is none.
-int chosenField(const TetMesh& mesh, const std::vector<int>& fields, const std::string& name);
-
 }  // namespace tessera
