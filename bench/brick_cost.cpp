@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh/element_index.h"
@@ -193,24 +193,20 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
 
 int main(int count, char** words) {
     Options options;
-    CLI::App app("Time to sample one brick against the elements that it holds");
-    app.add_option("meshes", options.meshPaths, "mesh files; without, graded boxes of --elements");
-    app.add_option("--elements", options.elements, "sizes of the graded boxes")->delimiter(',');
-    app.add_option("--algorithms", options.algorithms)->delimiter(',');
-    app.add_option("--bricks", options.bricks, "kinds of bricks, edge:elements")->delimiter(',');
-    app.add_option("--count", options.count, "bricks of a kind");
-    app.add_option("--threads", options.threads);
-    app.add_option("--index-threads", options.indexThreads);
-    CLI11_PARSE(app, count, words);
-    try {
+    tessera::bench::Arguments arguments("Time to sample one brick against the elements that it holds");
+    arguments.add("meshes", options.meshPaths, "mesh files; without, graded boxes of --elements");
+    arguments.add("--elements", options.elements, "sizes of the graded boxes");
+    arguments.add("--algorithms", options.algorithms);
+    arguments.add("--bricks", options.bricks, "kinds of bricks, edge:elements");
+    arguments.add("--count", options.count, "bricks of a kind");
+    arguments.add("--threads", options.threads);
+    arguments.add("--index-threads", options.indexThreads);
+    return arguments.run(count, words, [&] {
         for (const std::string& path : options.meshPaths)
             measure(options, path, tessera::readMesh(path, {}, {}).mesh);
         if (options.meshPaths.empty())
             for (const std::int64_t elements : options.elements)
                 measure(options, "graded box", gradedBox(elements));
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "brick_cost: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

@@ -5,13 +5,13 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <exception>
 #include <numeric>
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_mesh.h"
@@ -120,21 +120,17 @@ void compare(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    CLI::App app("Times Tessera against vtkResampleToImage.");
+int main(int count, char** words) {
     Options options;
-    app.add_option("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py")->required();
-    app.add_option("--algorithms", options.algorithms, "software, slicing, hybrid")->delimiter(',');
-    app.add_option("--csv", options.csvPath, "also write the figures here");
-    app.add_option("--points", options.sizes, "lattice points along an axis")->delimiter(',');
-    app.add_option("--runs", options.runs)->check(CLI::Range(1, 1000));
-    app.add_option("--threads", options.threads)->check(CLI::Range(1, 1024));
-    CLI11_PARSE(app, argc, argv);
-    try {
+    tessera::bench::Arguments arguments("Times Tessera against vtkResampleToImage.");
+    arguments.addNeeded("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py");
+    arguments.add("--algorithms", options.algorithms, "software, slicing, hybrid");
+    arguments.add("--csv", options.csvPath, "also write the figures here");
+    arguments.add("--points", options.sizes, "lattice points along an axis");
+    arguments.add("--runs", options.runs, "", {1, 1000});
+    arguments.add("--threads", options.threads, "", {1, 1024});
+    return arguments.run(count, words, [&] {
         compare(options);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "compare_vtk: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

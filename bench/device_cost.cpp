@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -14,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "bench_statistics.h"
 #include "hybrid/slice_polygon_generator.h"
 #include "index_space/node_frame.h"
@@ -138,19 +138,14 @@ void count(const std::string& path, int points) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    CLI::App app("Counts what a resample asks of an OpenGL device.");
+int main(int wordCount, char** words) {
     std::string path;
     int points = 256;
-    app.add_option("mesh", path, "e.g. that of make_graded_mesh.py")->required();
-    // More would be several regions.
-    app.add_option("--points", points, "lattice points along an axis")->check(CLI::Range(2, 256));
-    CLI11_PARSE(app, argc, argv);
-    try {
+    tessera::bench::Arguments arguments("Counts what a resample asks of an OpenGL device.");
+    arguments.addNeeded("mesh", path, "e.g. that of make_graded_mesh.py");
+    arguments.add("--points", points, "lattice points along an axis", {2, 256});
+    return arguments.run(wordCount, words, [&] {
         count(path, points);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "device_cost: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>
@@ -16,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "reader/isolated_reader.h"
@@ -120,22 +120,19 @@ void compare(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    CLI::App app("Times reading a mesh in process against reading it in a process of its own.");
+int main(int count, char** words) {
     Options options;
-    app.add_option("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py")->required();
-    app.add_option("--program", options.program, "the tessera program");
-    app.add_option("--reader", options.reader,
-                   "the program that the library starts; empty: the tessera program");
-    app.add_option("--csv", options.csvPath, "also write the figures here");
-    app.add_option("--runs", options.runs)->check(CLI::Range(1, 1000));
-    app.add_option("--threads", options.threads)->check(CLI::Range(0, 1024));
-    CLI11_PARSE(app, argc, argv);
-    try {
+    tessera::bench::Arguments arguments(
+        "Times reading a mesh in process against reading it in a process of its own.");
+    arguments.addNeeded("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py");
+    arguments.add("--program", options.program, "the tessera program");
+    arguments.add("--reader", options.reader,
+                  "the program that the library starts; empty: the tessera program");
+    arguments.add("--csv", options.csvPath, "also write the figures here");
+    arguments.add("--runs", options.runs, "", {1, 1000});
+    arguments.add("--threads", options.threads, "", {0, 1024});
+    return arguments.run(count, words, [&] {
         compare(options);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "isolated_read: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -20,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_mesh.h"
@@ -207,23 +207,18 @@ void measure(const Options& options) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-    CLI::App app("Time per element-slice pair against the size of the mesh.");
+int main(int count, char** words) {
     Options options;
-    app.add_option("meshes", options.meshPaths, "files of make_graded_mesh.py, the smallest first")
-        ->required();
-    app.add_option("--algorithms", options.algorithms, "slicing, hybrid")->delimiter(',');
-    app.add_option("--points", options.points, "lattice points along an axis")->check(CLI::Range(2, 2048));
-    app.add_option("--runs", options.runs)->check(CLI::Range(1, 1000));
-    app.add_option("--threads", options.threads)->check(CLI::Range(1, 1024));
-    app.add_option("--csv", options.csvPath, "also write the figures here");
-    app.add_flag("--hash", options.isHashed, "also print a hash of all samples");
-    CLI11_PARSE(app, argc, argv);
-    try {
+    tessera::bench::Arguments arguments("Time per element-slice pair against the size of the mesh.");
+    arguments.addNeeded("meshes", options.meshPaths, "files of make_graded_mesh.py, the smallest first");
+    arguments.add("--algorithms", options.algorithms, "slicing, hybrid");
+    arguments.add("--points", options.points, "lattice points along an axis", {2, 2048});
+    arguments.add("--runs", options.runs, "", {1, 1000});
+    arguments.add("--threads", options.threads, "", {1, 1024});
+    arguments.add("--csv", options.csvPath, "also write the figures here");
+    arguments.add("--hash", options.isHashed, "also print a hash of all samples");
+    return arguments.run(count, words, [&] {
         measure(options);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "pair_cost: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -18,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "bench_statistics.h"
 #include "brick/growing_tree.h"
 
@@ -142,19 +142,15 @@ void run(int changes, int rounds, const std::string& csvPath) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int count, char** words) {
     int changes = 20000, rounds = 3;
     std::string csvPath;
-    CLI::App app("Times splits and merges in growing trees of bricks.");
-    app.add_option("--changes", changes, "splits a round")->check(CLI::Range(100, 10000000));
-    app.add_option("--rounds", rounds, "rounds a size")->check(CLI::Range(1, 1000));
-    app.add_option("--csv", csvPath, "also write the figures here");
-    CLI11_PARSE(app, argc, argv);
-    try {
+    tessera::bench::Arguments arguments("Times splits and merges in growing trees of bricks.");
+    arguments.add("--changes", changes, "splits a round", {100, 10000000});
+    arguments.add("--rounds", rounds, "rounds a size", {1, 1000});
+    arguments.add("--csv", csvPath, "also write the figures here");
+    return arguments.run(count, words, [&] {
         run(changes, rounds, csvPath);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "tree_cost: {}\n", error.what());
-        return 1;
-    }
-    return 0;
+        return 0;
+    });
 }

@@ -1,4 +1,5 @@
-# One target a folder: tessera_layer(<name> SOURCES ... LINK <layers> PRIVATE_LINK <libraries> PUBLIC_LINK <libraries>).
+# One target a folder: tessera_layer(<name> [UNITY] SOURCES ... LINK <layers> PRIVATE_LINK <libraries> PUBLIC_LINK <libraries>).
+# UNITY: its sources are compiled a few at a time, which pays where headers cost more than the sources.
 # The LINK list of a layer is its row in docs/architecture.md; tests/layering_test.py compares the includes with it.
 
 add_library(tessera_flags INTERFACE)
@@ -17,7 +18,7 @@ include(TesseraPrecompiled)
 set_property(GLOBAL PROPERTY TESSERA_LAYERS "")
 
 function(tessera_layer name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PUBLIC_LINK;PRIVATE_LINK" ${ARGN})
+  cmake_parse_arguments(ARG "UNITY" "" "SOURCES;LINK;PUBLIC_LINK;PRIVATE_LINK" ${ARGN})
   add_library(tessera_${name} STATIC ${ARG_SOURCES})
   add_library(Tessera::${name} ALIAS tessera_${name})
   set_target_properties(tessera_${name} PROPERTIES EXPORT_NAME ${name})
@@ -31,6 +32,11 @@ function(tessera_layer name)
   target_link_libraries(tessera_${name} PUBLIC ${ARG_PUBLIC_LINK} PRIVATE ${ARG_PRIVATE_LINK}
     $<BUILD_INTERFACE:tessera_flags>)
   tessera_precompile(tessera_${name})
+  if(ARG_UNITY OR TESSERA_UNITY)
+    set_target_properties(tessera_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 7)
+    # It asks whether a type stands in the file compiled, which is never so here.
+    target_compile_options(tessera_${name} PRIVATE -Wno-subobject-linkage)
+  endif()
   set_property(GLOBAL APPEND PROPERTY TESSERA_LAYERS ${name})
 endfunction()
 

@@ -36,7 +36,7 @@ endif()
 # What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
 # nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
 set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine seams measure extend oracle
-  contract_checker contract_format contract_test hard_cases perturbed vdb vti image library)
+  contract_checker contract_format contract_test hard_cases perturbed vdb image library)
 if(TESSERA_SANITIZE MATCHES thread)
   set(sanitized_areas base gl_test compare software contract_test brick_store refine seams measure)
 endif()
@@ -55,3 +55,10 @@ if(TARGET tessera)
   # It sends signals in the middle of a run, so nothing else should slow that run down.
   set_tests_properties(app_test.Interruption PROPERTIES RUN_SERIAL ON)
 endif()
+
+# The longest start first, so that none is left alone at the end.
+foreach(test hard_cases_test external_check_against_vtk contract_test contract_data_test install_test random_plans app_test.Reports app_test.Reader)
+  if(TEST ${test})
+    set_tests_properties(${test} PROPERTIES COST 500)
+  endif()
+endforeach()

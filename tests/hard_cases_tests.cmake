@@ -11,7 +11,7 @@ if(TESSERA_SANITIZE MATCHES address)
   # The bits must be the same here; the contract at every point is checked in the release build.
   set_tests_properties(hard_cases_test PROPERTIES ENVIRONMENT "GTEST_FILTER=*HardCaseHashes*:HardCaseList*")
 endif()
-if(TARGET CLI11::CLI11)
+if(TARGET bench_arguments)
   tessera_program(accuracy_table SOURCES hard_cases/accuracy_table.cpp
-    LINK reference registry PRIVATE_LINK hard_cases CLI11::CLI11 fmt::fmt GTest::gtest)
+    LINK reference registry PRIVATE_LINK hard_cases bench_arguments fmt::fmt GTest::gtest)
 endif()

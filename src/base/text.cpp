@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <cstdio>
 
 namespace tessera {
 
@@ -9,6 +10,18 @@ std::string exactText(double value) {
     std::array<char, 40> text{};
     const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
     return std::string(text.data(), end);
+}
+
+std::string shortNumber(double value, int digits) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+    return text.data();
+}
+
+std::string placeText(const Vec3d& place) {
+    std::array<char, 96> text{};
+    std::snprintf(text.data(), text.size(), "(%.6g, %.6g, %.6g)", place.x, place.y, place.z);
+    return text.data();
 }
 
 std::vector<char32_t> decodeUtf8(std::string_view text) {

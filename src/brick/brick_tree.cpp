@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <tuple>
 
 #include "base/check.h"
 
@@ -19,11 +18,6 @@ std::size_t BrickKeyHash::operator()(const BrickKey& key) const {
 }
 
 namespace {
-
-bool storageOrder(const BrickKey& a, const BrickKey& b) {
-    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
-           std::tie(b.level, b.index.z, b.index.y, b.index.x);
-}
 
 // Arithmetic shifts round towards minus infinity, as floor division by a power of two does.
 Vec3i ancestorIndex(const Vec3i& index, int levels) {
@@ -43,7 +37,7 @@ BrickTree::BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCel
     TESSERA_CHECK(brickCells > 0 && std::has_single_bit(unsigned(brickCells)),
                   "a brick has a power of two of cells");
     TESSERA_CHECK(spacingWorld > 0, "a brick tree needs a spacing");
-    std::sort(leaves_.begin(), leaves_.end(), storageOrder);
+    std::sort(leaves_.begin(), leaves_.end(), inStorageOrder);
     if (leaves_.empty()) return;
     TESSERA_CHECK(leaves_.front().level >= 0, "levels count from 0");
     levelCount_ = leaves_.back().level + 1;

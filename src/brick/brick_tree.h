@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -26,6 +27,12 @@ struct BrickKey {
     Vec3i index{0};
     friend bool operator==(const BrickKey&, const BrickKey&) = default;
 };
+
+/// Ascending by level, z, y, x.
+inline bool inStorageOrder(const BrickKey& a, const BrickKey& b) {
+    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
+           std::tie(b.level, b.index.z, b.index.y, b.index.x);
+}
 
 struct BrickKeyHash {
     std::size_t operator()(const BrickKey& key) const;

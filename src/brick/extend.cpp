@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <unordered_set>
 
 #include "base/floor_div.h"
@@ -25,11 +24,6 @@ namespace {
 constexpr std::int64_t kElementChunk = 4096;
 // A cell counts as touched within this many voxels: more than a place in it can be off by rounding.
 constexpr double kTouchSlack = 1.0 / 1024;
-
-bool ascending(const BrickKey& a, const BrickKey& b) {
-    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
-           std::tie(b.level, b.index.z, b.index.y, b.index.x);
-}
 
 bool fullyCovered(const BrickStore& store, std::size_t leaf) {
     for (int t = 0; t < store.tileCount(); ++t) {
@@ -291,7 +285,7 @@ std::vector<BrickKey> targetBricks(const BrickTree& tree) {
             keys.insert(near);
         }
     std::vector<BrickKey> sorted(keys.begin(), keys.end());
-    std::sort(sorted.begin(), sorted.end(), ascending);
+    std::sort(sorted.begin(), sorted.end(), inStorageOrder);
     return sorted;
 }
 

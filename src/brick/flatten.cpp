@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <tuple>
 #include <vector>
 
 #include "base/floor_div.h"
@@ -17,13 +16,8 @@ namespace tessera {
 
 namespace {
 
-bool ascending(const BrickKey& a, const BrickKey& b) {
-    return std::tie(a.level, a.index.z, a.index.y, a.index.x) <
-           std::tie(b.level, b.index.z, b.index.y, b.index.x);
-}
-
 void sortOut(std::vector<BrickKey>& keys) {
-    std::sort(keys.begin(), keys.end(), ascending);
+    std::sort(keys.begin(), keys.end(), inStorageOrder);
     keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
 }
 

@@ -15,7 +15,7 @@ namespace tessera {
 namespace {
 
 /// Places further away than that aren't in any brick, whose lattice points have indices within 2^30.
-constexpr double kFarthestIndex = 0x1p30;
+constexpr double kFarthestVoxel = 0x1p30;
 
 RefineOptions refineOptions(const TetMesh& mesh, const ChosenFields& chosen, const BrickOptions& options) {
     if (!options.errorFields.empty() && options.criterion != Criterion::error)
@@ -167,7 +167,7 @@ std::optional<double> Bricks::value(const Vec3d& placeWorld, int channel) const 
                          std::to_string(parts_->chosen.channels));
     const Vec3d index0 = (placeWorld - tree.originWorld()) / tree.spacingWorld();
     for (int axis = 0; axis < 3; ++axis)
-        if (!(std::abs(index0[axis]) < kFarthestIndex)) return std::nullopt;
+        if (!(std::abs(index0[axis]) < kFarthestVoxel)) return std::nullopt;
     const std::int32_t leaf = leafOfPlace(tree, index0);
     if (leaf < 0) return std::nullopt;
     const Vec3d index = std::ldexp(1.0, -tree.leaves()[std::size_t(leaf)].level) * index0;

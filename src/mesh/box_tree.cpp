@@ -9,7 +9,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 14;
+constexpr std::int64_t kTreeChunk = 1 << 14;
 
 /// Below this many items one task sorts a whole subtree.
 constexpr std::int64_t kTaskItems = 1 << 14;
@@ -95,7 +95,7 @@ template <class BoxOf>
 std::vector<BoxTree::Node> buildLevel(std::int64_t count, const Execution& execution, const BoxOf& boxOf) {
     const std::int64_t nodes = (count + BoxTree::kWidth - 1) / BoxTree::kWidth;
     std::vector<BoxTree::Node> level{std::size_t(nodes)};
-    parallelForChunks(execution, nodes, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    parallelForChunks(execution, nodes, kTreeChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t n = begin; n < end; ++n) {
             BoxTree::Node node = emptyNode();
             for (std::int64_t c = 0; c < BoxTree::kWidth && n * BoxTree::kWidth + c < count; ++c)
@@ -112,7 +112,7 @@ BoxTree::BoxTree(std::span<const Box3d> boxes, const Execution& execution) {
     if (boxes.empty()) return;
     const auto count = std::int64_t(boxes.size());
     std::vector<Item> items(boxes.size());
-    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    parallelForChunks(execution, count, kTreeChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t i = begin; i < end; ++i) {
             const Box3d& box = boxes[std::size_t(i)];
             items[std::size_t(i)] = {box.min + 0.5 * (box.max - box.min), std::int32_t(i)};

@@ -12,7 +12,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 14;
+constexpr std::int64_t kClassChunk = 1 << 14;
 /// Below this share of the longest edge squared a face's normal is mostly rounding.
 constexpr double kNoNormal = 1e-13;
 
@@ -156,12 +156,12 @@ ClassCounts countClasses(const TetMesh& mesh, const ClassLimits& limits, const E
         ClassCounts counts;
         std::vector<std::int32_t> degenerate;
     };
-    const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
+    const std::int64_t chunks = (mesh.elementCount() + kClassChunk - 1) / kClassChunk;
     std::vector<Part> parts{std::size_t(chunks)};
     parallelFor(execution, chunks, [&](std::int64_t chunk) {
         Part& part = parts[std::size_t(chunk)];
-        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kChunk);
-        for (std::int64_t e = chunk * kChunk; e < end; ++e) {
+        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kClassChunk);
+        for (std::int64_t e = chunk * kClassChunk; e < end; ++e) {
             const ElementClass found = classOf(cornersOf(mesh, e), limits);
             ++part.counts.of[std::size_t(found)];
             if (found != ElementClass::good) part.degenerate.push_back(std::int32_t(e));

@@ -12,7 +12,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 13;
+constexpr std::int64_t kIndexChunk = 1 << 13;
 /// Parts that are sorted by themselves before they are merged.
 constexpr std::size_t kSortParts = 8;
 /// Fewer numbers are sorted by comparison.
@@ -88,11 +88,11 @@ Box3d boxOf(const TetMesh& mesh, std::int64_t element) {
 
 Box3d boundsOfElements(const TetMesh& mesh, const Execution& execution) {
     const std::int64_t count = mesh.elementCount();
-    std::vector<Box3d> parts(std::size_t((count + kChunk - 1) / kChunk));
-    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<Box3d> parts(std::size_t((count + kIndexChunk - 1) / kIndexChunk));
+    parallelForChunks(execution, count, kIndexChunk, [&](std::int64_t begin, std::int64_t end) {
         Box3d box;
         for (std::int64_t e = begin; e < end; ++e) box.include(boxOf(mesh, e));
-        parts[std::size_t(begin / kChunk)] = box;
+        parts[std::size_t(begin / kIndexChunk)] = box;
     });
     Box3d bounds;
     for (const Box3d& part : parts) bounds.include(part);
@@ -159,7 +159,7 @@ struct ElementIndex::Builder {
         const std::int64_t count = mesh.elementCount();
         std::vector<Keyed> keys(mesh.tets.size());
         constexpr double kCells = double(1 << kMortonBits);
-        parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        parallelForChunks(execution, count, kIndexChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t e = begin; e < end; ++e) {
                 const Box3d box = boxOf(mesh, e);
                 std::uint64_t key = 0;
@@ -202,7 +202,7 @@ struct ElementIndex::Builder {
     std::vector<Node> makeLevel(std::int64_t children, const BoxOf& childBox) {
         const std::int64_t count = (children + kWidth - 1) / kWidth;
         std::vector<Node> level{std::size_t(count)};
-        parallelForChunks(execution, count, kChunk / kWidth, [&](std::int64_t begin, std::int64_t end) {
+        parallelForChunks(execution, count, kIndexChunk / kWidth, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t n = begin; n < end; ++n)
                 for (std::int64_t c = 0; c < kWidth; ++c) {
                     const std::int64_t below = n * kWidth + c;

@@ -14,7 +14,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 14;
+constexpr std::int64_t kQualityChunk = 1 << 14;
 
 /// A node counts as lying on a face when it is this close to it, over the face's longest edge: about the
 /// rounding of coordinates that were stored as float.
@@ -64,11 +64,11 @@ Extremes measureElements(const TetMesh& mesh, std::vector<std::uint8_t>& flat, s
 }
 
 Extremes measureElements(const TetMesh& mesh, std::vector<std::uint8_t>& flat, const Execution& execution) {
-    const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
+    const std::int64_t chunks = (mesh.elementCount() + kQualityChunk - 1) / kQualityChunk;
     std::vector<Extremes> parts{std::size_t(chunks)};
     parallelFor(execution, chunks, [&](std::int64_t c) {
-        parts[std::size_t(c)] =
-            measureElements(mesh, flat, c * kChunk, std::min(mesh.elementCount(), (c + 1) * kChunk));
+        parts[std::size_t(c)] = measureElements(mesh, flat, c * kQualityChunk,
+                                                std::min(mesh.elementCount(), (c + 1) * kQualityChunk));
     });
     Extremes all;
     for (const Extremes& part : parts) all.include(part);
@@ -178,7 +178,7 @@ std::vector<std::int32_t> firstNodeAtPlace(const std::vector<Vec3d>& points, con
     constexpr std::size_t kBuckets = 256;
     const auto count = std::int64_t(points.size());
     std::vector<std::uint64_t> hashes(points.size());
-    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    parallelForChunks(execution, count, kQualityChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t i = begin; i < end; ++i) hashes[std::size_t(i)] = hashPlace(points[std::size_t(i)]);
     });
     std::array<std::size_t, kBuckets + 1> bucketBegin{};

@@ -31,14 +31,15 @@ struct Candidate {
 
 /// A face with its nodes in ascending order: the distance to an edge comes out the same, bit for bit, from
 /// both its faces.
-struct Triangle {
+struct BoundaryTriangle {
     std::array<Vec3d, 3> corners;
     std::array<std::int32_t, 3> nodes;
     std::int32_t element;
 };
 
 /// Nearest place on the edge i-j, which may have no length.
-void offerEdge(const Triangle& triangle, std::size_t i, std::size_t j, const Vec3d& point, Candidate& best) {
+void offerEdge(const BoundaryTriangle& triangle, std::size_t i, std::size_t j, const Vec3d& point,
+               Candidate& best) {
     const Vec3d edge = triangle.corners[j] - triangle.corners[i];
     const Vec3d toPoint = point - triangle.corners[i];
     const double length2 = glm::dot(edge, edge);
@@ -57,7 +58,7 @@ void offerEdge(const Triangle& triangle, std::size_t i, std::size_t j, const Vec
 /// Nearest place on a triangle that may be a segment or a point. Every candidate is a true place of the
 /// triangle with its own distance, so rounding can cost a little distance on a needle but never gives a wrong
 /// place.
-Candidate nearestOnTriangle(const Triangle& triangle, const Vec3d& point) {
+Candidate nearestOnTriangle(const BoundaryTriangle& triangle, const Vec3d& point) {
     const Vec3d u = triangle.corners[1] - triangle.corners[0];
     const Vec3d v = triangle.corners[2] - triangle.corners[0];
     const Vec3d w = point - triangle.corners[0];
@@ -111,11 +112,11 @@ double NearestPoint::value(const Field& field, int component) const {
 
 struct NearestPointIndex::Impl {
     BoxTree tree;
-    std::vector<Triangle> triangles;  // in the order of the tree
+    std::vector<BoundaryTriangle> triangles;  // in the order of the tree
 
-    void offerTriangle(std::int64_t place, const Vec3d& point, double& best2, const Triangle*& bestTriangle,
-                       Candidate& best) const {
-        const Triangle& triangle = triangles[std::size_t(place)];
+    void offerTriangle(std::int64_t place, const Vec3d& point, double& best2,
+                       const BoundaryTriangle*& bestTriangle, Candidate& best) const {
+        const BoundaryTriangle& triangle = triangles[std::size_t(place)];
         const Candidate candidate = nearestOnTriangle(triangle, point);
         if (candidate.distance2 > best2) return;
         if (candidate.distance2 == best2 && bestTriangle &&
@@ -138,7 +139,7 @@ NearestPointIndex::NearestPointIndex(const TetMesh& mesh, int threads) : impl_(s
     impl_->tree = BoxTree(boxes, execution);
     impl_->triangles.reserve(faces.size());
     for (const std::int32_t f : impl_->tree.order()) {
-        Triangle triangle;
+        BoundaryTriangle triangle;
         triangle.nodes = faces[std::size_t(f)].nodes;
         std::sort(triangle.nodes.begin(), triangle.nodes.end());
         for (std::size_t i = 0; i < 3; ++i) triangle.corners[i] = mesh.points[std::size_t(triangle.nodes[i])];
@@ -155,7 +156,7 @@ NearestPoint NearestPointIndex::find(const Vec3d& pointWorld, double maxDistance
     if (tree.empty() || !(maxDistanceWorld >= 0)) return result;
 
     double best2 = maxDistanceWorld * maxDistanceWorld;
-    const Triangle* bestTriangle = nullptr;
+    const BoundaryTriangle* bestTriangle = nullptr;
     Candidate best;
     // Four children a level, at most 16 levels over 2^31 faces.
     std::array<PendingNode, 64> stack;

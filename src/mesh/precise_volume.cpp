@@ -13,7 +13,7 @@ namespace {
 
 __extension__ typedef __float128 Quad;
 
-constexpr std::int64_t kChunk = 1 << 14;
+constexpr std::int64_t kVolumeChunk = 1 << 14;
 constexpr double kGoodEnough = 1e-12;
 
 /// Adds up and keeps what each addition rounds off. After: A. Neumaier, Rundungsfehleranalyse einiger
@@ -48,11 +48,11 @@ double preciseVolume(const Corners& corners) {
 }
 
 double totalVolume(const TetMesh& mesh, const Execution& execution) {
-    const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
+    const std::int64_t chunks = (mesh.elementCount() + kVolumeChunk - 1) / kVolumeChunk;
     std::vector<CompensatedSum> parts{std::size_t(chunks)};
     parallelFor(execution, chunks, [&](std::int64_t chunk) {
-        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kChunk);
-        for (std::int64_t e = chunk * kChunk; e < end; ++e)
+        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kVolumeChunk);
+        for (std::int64_t e = chunk * kVolumeChunk; e < end; ++e)
             parts[std::size_t(chunk)].add(preciseVolume(cornersOf(mesh, e)));
     });
     CompensatedSum all;

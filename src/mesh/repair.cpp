@@ -19,7 +19,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 14;
+constexpr std::int64_t kRepairChunk = 1 << 14;
 /// Times minAspect and the longest edge: how far the boundary may move in one operation.
 constexpr double kDeviation = 4;
 /// The same: how far apart parts are that are merged before an element at the boundary is taken away.
@@ -312,11 +312,11 @@ void Repairer::countKept(const std::vector<std::int32_t>& pending) {
 }
 
 std::int64_t turnInverted(TetMesh& mesh, const Execution& execution) {
-    const std::int64_t chunks = (mesh.elementCount() + kChunk - 1) / kChunk;
+    const std::int64_t chunks = (mesh.elementCount() + kRepairChunk - 1) / kRepairChunk;
     std::vector<std::int64_t> parts(std::size_t(chunks), 0);
     parallelFor(execution, chunks, [&](std::int64_t chunk) {
-        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kChunk);
-        for (std::int64_t e = chunk * kChunk; e < end; ++e) {
+        const std::int64_t end = std::min(mesh.elementCount(), (chunk + 1) * kRepairChunk);
+        for (std::int64_t e = chunk * kRepairChunk; e < end; ++e) {
             const Corners c = cornersOf(mesh, e);
             if (volumeSign(c[0], c[1], c[2], c[3]) >= 0) continue;
             auto& tet = mesh.tets[std::size_t(e)];

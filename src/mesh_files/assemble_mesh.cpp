@@ -20,7 +20,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 15;
+constexpr std::int64_t kAssembleChunk = 1 << 15;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::string coordinateText(const Vec3d& p) {
@@ -43,13 +43,14 @@ void forEachNode(CellKind kind, Nodes nodes, std::int64_t count, const Visit& vi
 
 template <class Visit>
 void forEachNode(CellList& cells, const Execution& execution, const Visit& visit) {
-    parallelForChunks(execution, cells.cellCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t c = begin; c < end; ++c) {
-            const std::int64_t first = cells.begin[std::size_t(c)];
-            forEachNode(cells.kinds[std::size_t(c)], cells.nodes.data() + first,
-                        cells.begin[std::size_t(c) + 1] - first, visit);
-        }
-    });
+    parallelForChunks(execution, cells.cellCount(), kAssembleChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          for (std::int64_t c = begin; c < end; ++c) {
+                              const std::int64_t first = cells.begin[std::size_t(c)];
+                              forEachNode(cells.kinds[std::size_t(c)], cells.nodes.data() + first,
+                                          cells.begin[std::size_t(c) + 1] - first, visit);
+                          }
+                      });
 }
 
 template <class Item>
@@ -93,7 +94,7 @@ void gatherTuples(Field& field, const std::vector<Index>& items, const Execution
     const auto components = std::size_t(field.components);
     std::vector<double> values(items.size() * components);
     parallelForChunks(
-        execution, std::int64_t(items.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        execution, std::int64_t(items.size()), kAssembleChunk, [&](std::int64_t begin, std::int64_t end) {
             for (auto i = std::size_t(begin); i < std::size_t(end); ++i)
                 for (std::size_t c = 0; c < components; ++c)
                     values[i * components + c] = field.values[std::size_t(items[i]) * components + c];

@@ -16,7 +16,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::string_view kSpaces = " \t\n\v\f\r";
+constexpr std::string_view kWhiteSpace = " \t\n\v\f\r";
 constexpr std::int64_t kMostNodes = 2147483647;
 constexpr std::size_t kLongestDeclaration = 512;
 
@@ -47,7 +47,7 @@ bool startsWithWord(std::string_view text, std::string_view lowerWord) {
 constexpr unsigned char kBlank = 1, kInitial = kBlank << 1;
 constexpr std::array<unsigned char, 256> kKinds = [] {
     std::array<unsigned char, 256> kinds{};
-    for (const char blank : kSpaces) kinds[static_cast<unsigned char>(blank)] = kBlank;
+    for (const char blank : kWhiteSpace) kinds[static_cast<unsigned char>(blank)] = kBlank;
     for (const Declaration& declaration : kDeclarations) {
         const auto initial = static_cast<unsigned char>(declaration.keyword.front());
         kinds[initial] = kinds[initial - 'a' + 'A'] = kInitial;
@@ -84,10 +84,12 @@ std::size_t LegacyCheck::checkHead() {
                          ", expected '# vtk DataFile Version'");
     const std::size_t title = file_.find("\n", 0);
     const std::size_t titleEnd = title == InputFile::npos ? title : file_.find("\n", title + 1);
-    const std::size_t kind = titleEnd == InputFile::npos ? titleEnd : file_.findFirstNotOf(kSpaces, titleEnd);
-    const std::size_t kindEnd = kind == InputFile::npos ? kind : file_.findFirstOf(kSpaces, kind);
-    const std::size_t next = kindEnd == InputFile::npos ? kindEnd : file_.findFirstNotOf(kSpaces, kindEnd);
-    if (next == InputFile::npos || file_.findFirstOf(kSpaces, next) == InputFile::npos)
+    const std::size_t kind =
+        titleEnd == InputFile::npos ? titleEnd : file_.findFirstNotOf(kWhiteSpace, titleEnd);
+    const std::size_t kindEnd = kind == InputFile::npos ? kind : file_.findFirstOf(kWhiteSpace, kind);
+    const std::size_t next =
+        kindEnd == InputFile::npos ? kindEnd : file_.findFirstNotOf(kWhiteSpace, kindEnd);
+    if (next == InputFile::npos || file_.findFirstOf(kWhiteSpace, next) == InputFile::npos)
         throw InputError(path_ + ": cut off at byte " + std::to_string(file_.size()) +
                          ", inside the four lines of its head");
     isAscii_ = !startsWithWord(file_.bytesFrom(kind, 6), "binary");
@@ -101,10 +103,10 @@ void LegacyCheck::refuse(std::string_view text, std::size_t at, const std::strin
 
 /// @param text from the keyword on; @param at its byte.
 void LegacyCheck::checkDeclaration(const Declaration& declaration, std::string_view text, std::size_t at) {
-    std::size_t next = std::min(text.find_first_of(kSpaces), text.size());
+    std::size_t next = std::min(text.find_first_of(kWhiteSpace), text.size());
     double product = 1, last = 0;
     for (std::size_t i = 0; i < declaration.numbers; ++i) {
-        next = std::min(text.find_first_not_of(kSpaces, next), text.size());
+        next = std::min(text.find_first_not_of(kWhiteSpace, next), text.size());
         if (text.substr(next).starts_with('+')) ++next;
         std::int64_t count = 0;
         const auto result = std::from_chars(text.data() + next, text.data() + text.size(), count);

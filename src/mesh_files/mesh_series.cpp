@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kSpaces = " \t\r\n";
+constexpr std::string_view kBlanks = " \t\r\n";
 constexpr double kTimeTolerance = 1e-9;
 
 bool isDigit(char c) {
@@ -116,8 +116,8 @@ std::optional<double> Collection::readTime(const XmlTag& tag) const {
     const auto attribute = attributeOf(tag.text, "timestep");
     if (!attribute) return std::nullopt;
     std::string_view text = *attribute;
-    text.remove_prefix(std::min(text.find_first_not_of(kSpaces), text.size()));
-    text = text.substr(0, text.find_last_not_of(kSpaces) + 1);
+    text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+    text = text.substr(0, text.find_last_not_of(kBlanks) + 1);
     if (text.starts_with('+')) text.remove_prefix(1);
     double time = 0;
     const auto result = std::from_chars(text.data(), text.data() + text.size(), time);

@@ -30,7 +30,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 1 << 15;
+constexpr std::int64_t kConvertChunk = 1 << 15;
 
 /// What a VTK cell type is to us.
 struct CellRule {
@@ -134,7 +134,7 @@ void copyPoints(const std::string& path, vtkDataSet* data, const Execution& exec
     if (set && count > 0 && (!array || array->GetNumberOfComponents() != 3))
         throw InputError(path + ": points need 3 coordinates");
     const auto copyFrom = [&](const auto* values) {
-        parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        parallelForChunks(execution, count, kConvertChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t i = begin; i < end; ++i)
                 points[std::size_t(i)] = {double(values[3 * i]), double(values[3 * i + 1]),
                                           double(values[3 * i + 2])};
@@ -153,7 +153,7 @@ void copyValues(vtkDataArray* array, const Execution& execution, std::vector<dou
     const int components = array->GetNumberOfComponents();
     values.resize(std::size_t(count));
     const auto copyFrom = [&](const auto* source) {
-        parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+        parallelForChunks(execution, count, kConvertChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t i = begin; i < end; ++i) values[std::size_t(i)] = double(source[i]);
         });
     };
@@ -242,7 +242,7 @@ class UnstructuredCells {
     }
 
     void read(RawBlock& block, ImportStatistics& statistics, const Execution& execution) const {
-        const std::int64_t chunks = (cellCount_ + kChunk - 1) / kChunk;
+        const std::int64_t chunks = (cellCount_ + kConvertChunk - 1) / kConvertChunk;
         std::vector<ChunkCounts> counts{std::size_t(chunks)};
         parallelFor(execution, chunks, [&](std::int64_t k) { counts[std::size_t(k)] = count(k); });
         std::vector<std::int64_t> cellBase, nodeBase;
@@ -351,8 +351,8 @@ class UnstructuredCells {
 
     ChunkCounts count(std::int64_t chunk) const {
         ChunkCounts counts;
-        const std::int64_t end = std::min(cellCount_, (chunk + 1) * kChunk);
-        for (std::int64_t c = chunk * kChunk; c < end; ++c) {
+        const std::int64_t end = std::min(cellCount_, (chunk + 1) * kConvertChunk);
+        for (std::int64_t c = chunk * kConvertChunk; c < end; ++c) {
             const CellRule rule = ruleOf(types_[c]);
             if (!isSound(c, rule)) {
                 counts.bad = c;
@@ -374,8 +374,8 @@ class UnstructuredCells {
     }
 
     void fill(std::int64_t chunk, std::size_t cell, std::int64_t node, RawBlock& block) const {
-        const std::int64_t end = std::min(cellCount_, (chunk + 1) * kChunk);
-        for (std::int64_t c = chunk * kChunk; c < end; ++c) {
+        const std::int64_t end = std::min(cellCount_, (chunk + 1) * kConvertChunk);
+        for (std::int64_t c = chunk * kConvertChunk; c < end; ++c) {
             const CellRule rule = ruleOf(types_[c]);
             if (!rule.solid || isBlanked(c)) continue;
             block.cells.kinds[cell] = rule.kind;

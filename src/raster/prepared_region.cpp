@@ -12,7 +12,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 2048;
+constexpr std::int64_t kPreparedChunk = 2048;
 
 /// What one chunk of elements comes to; put together in order afterwards.
 struct Chunk {
@@ -178,10 +178,10 @@ void append(RecordList<Geometry>& to, const RecordList<Geometry>& from) {
 PreparedRegion prepareRegion(const RasterInputs& inputs, const IndexBox& points,
                              std::span<const std::int32_t> elements, const Execution& execution) {
     const auto count = std::int64_t(elements.size());
-    std::vector<Chunk> chunks(std::size_t((count + kChunk - 1) / kChunk));
-    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<Chunk> chunks(std::size_t((count + kPreparedChunk - 1) / kPreparedChunk));
+    parallelForChunks(execution, count, kPreparedChunk, [&](std::int64_t begin, std::int64_t end) {
         prepareChunk(inputs, points, elements.subspan(std::size_t(begin), std::size_t(end - begin)),
-                     chunks[std::size_t(begin / kChunk)]);
+                     chunks[std::size_t(begin / kPreparedChunk)]);
     });
     PreparedRegion region;
     region.points = points;

@@ -10,7 +10,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 4096;
+constexpr std::int64_t kPublishedChunk = 4096;
 
 struct PublishedChunk {
     std::vector<SliceElement> elements;
@@ -69,10 +69,10 @@ NodeCodes codesAtNodes(const ChannelCoding& coding, const TetMesh& mesh, std::in
 PreparedRegion preparePublishedRegion(const RasterInputs& inputs, const IndexBox& points,
                                       std::span<const std::int32_t> elements, const Execution& execution) {
     const auto count = std::int64_t(elements.size());
-    std::vector<PublishedChunk> chunks(std::size_t((count + kChunk - 1) / kChunk));
-    parallelForChunks(execution, count, kChunk, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<PublishedChunk> chunks(std::size_t((count + kPublishedChunk - 1) / kPublishedChunk));
+    parallelForChunks(execution, count, kPublishedChunk, [&](std::int64_t begin, std::int64_t end) {
         prepareChunk(inputs, points, elements.subspan(std::size_t(begin), std::size_t(end - begin)),
-                     chunks[std::size_t(begin / kChunk)]);
+                     chunks[std::size_t(begin / kPublishedChunk)]);
     });
     PreparedRegion region;
     region.points = points;

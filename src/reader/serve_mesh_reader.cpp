@@ -31,7 +31,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kLongestMessage = 1 << 16;
+constexpr std::size_t kLongestSentence = 1 << 16;
 constexpr int kMostArenas = 1;                  // more reserve 64 MB of address space each
 constexpr std::int64_t kThreadBytes = 9 << 20;  // a thread's stack, used or not
 constexpr std::int64_t kThreadShare = 8;        // threads take an eighth of the bound at most
@@ -48,7 +48,7 @@ void writeAll(int descriptor, const void* bytes, std::size_t count) {
 }
 
 void report(ReaderOutcome outcome, std::string message) {
-    message.resize(std::min(message.size(), kLongestMessage));
+    message.resize(std::min(message.size(), kLongestSentence));
     const ReportStart start{ReportStart::kMagic, outcome, message.size()};
     writeAll(kReportDescriptor, &start, sizeof start);
     writeAll(kReportDescriptor, message.data(), message.size());

@@ -15,7 +15,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 16384;
+constexpr std::int64_t kSampleChunk = 16384;
 
 SampledField describe(const Field& field, int firstChannel) {
     SampledField result{&field, firstChannel, 0, 0};
@@ -48,20 +48,22 @@ SampledMesh::SampledMesh(const TetMesh& mesh, std::span<const int> fields, const
 
 ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
     : SampledMesh(mesh, fields, execution), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
-    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t e = begin; e < end; ++e) {
-            const auto& tet = mesh.tets[std::size_t(e)];
-            const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
-                        &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
-            const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
-            if (!(std::abs(sixfold.value) > sixfold.errorBound) && exactVolumeSign(a, b, c, d) == 0) continue;
-            volume_[std::size_t(e)] = elementVolume(sixfold.value);
-            for (const std::int32_t node : tet) {
-                std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
-                if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
+    parallelForChunks(
+        execution, mesh.elementCount(), kSampleChunk, [&](std::int64_t begin, std::int64_t end) {
+            for (std::int64_t e = begin; e < end; ++e) {
+                const auto& tet = mesh.tets[std::size_t(e)];
+                const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
+                            &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
+                const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
+                if (!(std::abs(sixfold.value) > sixfold.errorBound) && exactVolumeSign(a, b, c, d) == 0)
+                    continue;
+                volume_[std::size_t(e)] = elementVolume(sixfold.value);
+                for (const std::int32_t node : tet) {
+                    std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
+                    if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
+                }
             }
-        }
-    });
+        });
 }
 
 namespace {
@@ -92,7 +94,7 @@ SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
     std::optional<Box3d> bounds;
     if (boundsWorld) bounds = Box3d{boundsWorld->min - origin, boundsWorld->max - origin};
     parallelForChunks(
-        execution, std::int64_t(samples.count()), kChunk, [&](std::int64_t begin, std::int64_t end) {
+        execution, std::int64_t(samples.count()), kSampleChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t s = begin; s < end; ++s) {
                 if (!samples.exists(std::size_t(s))) continue;
                 const Vec3d place = samples.placeWorld(std::size_t(s), origin);

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "base/text.h"
 #include "refine/plan_frame.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
@@ -20,12 +20,6 @@ namespace {
 constexpr double kSizeQuantile = 0.15;
 // Without any bound or spacing from the user a plan by element size stays below this.
 constexpr std::int64_t kDefaultElementSizeVoxels = 20'000'000;
-
-std::string shortNumber(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return text;
-}
 
 // An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and
 // so an ordinary size; flat boundary-layer elements come out between their thickness and their length.

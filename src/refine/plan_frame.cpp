@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "base/parallel.h"
+#include "base/text.h"
 #include "refine/refine_options.h"
 #include "refine/used_nodes.h"
 #include "tessera/error.h"
@@ -19,12 +19,6 @@ namespace {
 constexpr double kMaxIndex = 1 << 29;  // of level 0; resamplers take indices up to 2^30
 constexpr int kDefaultUniformResolution = 256;
 constexpr int kDefaultLevels = 8;
-
-std::string shortNumber(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.6g", value);
-    return text;
-}
 
 bool finite(const Vec3d& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -81,17 +75,17 @@ void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions
     require(options.resolution == 0 || options.resolution >= 2,
             "the resolution must be at least 2 points, not " + std::to_string(options.resolution));
     require(std::isfinite(options.spacingWorld) && options.spacingWorld >= 0,
-            "the spacing must be positive, not " + shortNumber(options.spacingWorld));
+            "the spacing must be positive, not " + shortNumber(options.spacingWorld, 6));
     require(options.resolution == 0 || options.spacingWorld == 0, "give a resolution or a spacing, not both");
     require(std::isfinite(options.samplesPerElement) && options.samplesPerElement > 0,
-            "samples per element must be positive, not " + shortNumber(options.samplesPerElement));
+            "samples per element must be positive, not " + shortNumber(options.samplesPerElement, 6));
     require(options.maxLevels >= 0,
             "the number of levels must be at least 1, not " + std::to_string(options.maxLevels));
     require(options.maxVoxels >= 0 && options.maxMemoryBytes >= 0,
             "bounds on voxels and memory must be positive");
     if (options.criterion == Criterion::error)
         require(std::isfinite(options.maxError) && options.maxError > 0,
-                "the error bound must be positive, not " + shortNumber(options.maxError));
+                "the error bound must be positive, not " + shortNumber(options.maxError, 6));
     if (options.frame)
         require(finite(options.frame->originWorld) && std::isfinite(options.frame->spacingWorld) &&
                     options.frame->spacingWorld > 0,
@@ -124,9 +118,9 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
         const double finest = finestSpacing(options, longest);
         const double far = farthestIndex(sampled, frame.originWorld, finest);
         if (!(far < kMaxIndex))
-            throw InputError("a spacing of " + shortNumber(finest) + " makes " + shortNumber(far) +
+            throw InputError("a spacing of " + shortNumber(finest, 6) + " makes " + shortNumber(far, 6) +
                              " lattice points along an axis, more than 2^29; the finest that fits is " +
-                             shortNumber(finest * far / kMaxIndex * 1.01));
+                             shortNumber(finest * far / kMaxIndex * 1.01, 6));
         int depth = 0;
         if (options.criterion != Criterion::uniform)
             while (depth + 1 < levels && longest / std::ldexp(finest, depth + 1) >= rootCells) ++depth;

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <tuple>
 
 #include "base/parallel.h"
+#include "base/text.h"
 #include "base/timer.h"
 #include "brick/kept_points.h"
 #include "mesh/field_range.h"
@@ -26,18 +26,6 @@ namespace {
 
 // Error-driven refinement without bounds from the user stops here: a gigabyte a channel.
 constexpr std::int64_t kDefaultErrorVoxels = std::int64_t(1) << 28;
-
-std::string shortNumber(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return text;
-}
-
-std::string placeText(const Vec3d& p) {
-    char text[96];
-    std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
-    return text;
-}
 
 // The bound on one field, in field units; infinite for fields that don't matter.
 struct FieldBound {

@@ -13,7 +13,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::int64_t kChunk = 16384;
+constexpr std::int64_t kErrorChunk = 16384;
 constexpr std::int64_t kRunChunk = 16;
 constexpr std::int64_t kPrefetch = 16;  // elements ahead: nodes are reached in no order
 constexpr std::size_t kBatch = 128;
@@ -243,9 +243,9 @@ void Measurement::measureBatch(Batch& batch, Part& part) {
 }
 
 std::vector<Part> Measurement::measureNodes(const std::vector<std::uint8_t>& used) {
-    std::vector<Part> parts(std::size_t((mesh_.nodeCount() + kChunk - 1) / kChunk));
-    parallelForChunks(execution_, mesh_.nodeCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        Part& part = parts[std::size_t(begin / kChunk)] = newPart();
+    std::vector<Part> parts(std::size_t((mesh_.nodeCount() + kErrorChunk - 1) / kErrorChunk));
+    parallelForChunks(execution_, mesh_.nodeCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
+        Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
         Batch batch(samples_.channels());
         for (std::int64_t n = begin; n < end; ++n) {
             const std::size_t node = std::size_t(n);
@@ -316,26 +316,28 @@ void Measurement::addWeighted(std::size_t f, std::size_t sample, double weight, 
 
 // The nodes' errors are known by now.
 std::vector<Part> Measurement::measureElements() {
-    std::vector<Part> parts(std::size_t((mesh_.elementCount() + kChunk - 1) / kChunk));
-    parallelForChunks(execution_, mesh_.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        Part& part = parts[std::size_t(begin / kChunk)] = newPart();
-        Batch batch(samples_.channels());
-        for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
-            gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
-            measureBatch(batch, part);
-            for (std::size_t f = 0; f < lists_.size(); ++f) {
-                const SampledField& field = samples_.fields()[f];
-                for (std::size_t i = 0; i < batch.count; ++i) {
-                    // A deferred centroid still has no error here; its weight is added when it has.
-                    addWeighted(f, batch.sample[i], centroidWeight(field) * batch.volume[i], part.sums[f]);
-                    if (field.isCell()) continue;
-                    for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
-                        addWeighted(f, std::size_t(node), kNodeWeight * batch.volume[i], part.sums[f]);
+    std::vector<Part> parts(std::size_t((mesh_.elementCount() + kErrorChunk - 1) / kErrorChunk));
+    parallelForChunks(
+        execution_, mesh_.elementCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
+            Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
+            Batch batch(samples_.channels());
+            for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
+                gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
+                measureBatch(batch, part);
+                for (std::size_t f = 0; f < lists_.size(); ++f) {
+                    const SampledField& field = samples_.fields()[f];
+                    for (std::size_t i = 0; i < batch.count; ++i) {
+                        // A deferred centroid still has no error here; its weight is added when it has.
+                        addWeighted(f, batch.sample[i], centroidWeight(field) * batch.volume[i],
+                                    part.sums[f]);
+                        if (field.isCell()) continue;
+                        for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
+                            addWeighted(f, std::size_t(node), kNodeWeight * batch.volume[i], part.sums[f]);
+                    }
                 }
             }
-        }
-        advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
-    });
+            advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
+        });
     measureDeferred(parts);
     return parts;
 }

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
+#include "base/text.h"
 #include "mesh/sub_mesh.h"
 #include "tessera/error.h"
 #include "tessera/lattice.h"
@@ -16,12 +16,6 @@ namespace {
 constexpr int kTilePixels = 2048;   // along the edge of one block: bounds the memory of blocks in flight
 constexpr double kSnap = 1e-6;      // share of a pixel by which a picture may be short of covering the cut
 constexpr double kPoint = 0x1p-40;  // a cut smaller than this share of the mesh is a point
-
-std::string placeText(const Vec3d& p) {
-    char text[96];
-    std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", p.x, p.y, p.z);
-    return text;
-}
 
 bool isFinite(const Vec3d& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

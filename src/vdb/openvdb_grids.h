@@ -18,6 +18,9 @@ extern template class openvdb::tree::Tree<openvdb::BoolTree::RootNodeType>;
 
 namespace tessera {
 
+/// Where a file holds its UUID, as text: after magic, format, library's two version numbers and a flag.
+constexpr std::size_t kUuidOffset = 21, kUuidBytes = 36;
+
 /// A place's or a vector's components in the file's axes, from those of the mesh.
 template <class Vector>
 Vector turned(const Vector& v, UpAxis upAxis) {

@@ -29,8 +29,6 @@
 namespace tessera {
 namespace {
 
-constexpr std::size_t kUuidOffset = 21;
-constexpr std::size_t kUuidBytes = 36;
 constexpr std::size_t kHeaderBytes = kUuidOffset + kUuidBytes;
 constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
 

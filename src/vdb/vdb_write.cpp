@@ -31,9 +31,6 @@ using BoolLeaf = openvdb::BoolTree::LeafNodeType;
 static_assert(FloatLeaf::DIM == kTileSize && FloatLeaf::SIZE == kTilePoints,
               "tiles are laid out as OpenVDB's leaf nodes");
 
-constexpr std::size_t kUuidOffset = 21;  // after magic, format, library's two version numbers and a flag
-constexpr std::size_t kUuidBytes = 36;
-
 constexpr double kLost =
     std::numeric_limits<double>::infinity();  // of an error in voxels: one voxel falls on another
 

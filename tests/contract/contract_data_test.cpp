@@ -39,6 +39,9 @@ class ContractOnData : public testing::TestWithParam<OnFile> {
     void SetUp() override {
         TESSERA_CONTRACT_NEEDS(subject());
         if (isHurried() && isAnotherDevice(subject())) GTEST_SKIP() << "generated meshes have to do there";
+        if (isHurried() && subject().isOnDevice() && !subject().isPrimary &&
+            (fileNumber() + std::size_t(subject().format)) % 3 != 0)
+            GTEST_SKIP() << "other meshes take this format";
         mesh_ = readMesh(std::get<1>(GetParam()), {}, {}).mesh;
         // Every field of every mesh goes through the first device, and one through the others.
         if (subject().isOnDevice() && !subject().isPrimary && mesh_.fields.size() > 1) mesh_.fields.resize(1);
@@ -46,6 +49,10 @@ class ContractOnData : public testing::TestWithParam<OnFile> {
         addRandomField(mesh_, "random of the test", FieldLocation::point, 1, 0, 1, 3);
     }
     const Subject& subject() const { return std::get<0>(GetParam()); }
+    std::size_t fileNumber() const {
+        static const std::vector<fs::path> files = meshFiles();
+        return std::size_t(std::find(files.begin(), files.end(), std::get<1>(GetParam())) - files.begin());
+    }
 
     /// About `points` lattice points along the longest axis.
     std::vector<LatticeCase> lattices(int points) const {
@@ -59,8 +66,10 @@ class ContractOnData : public testing::TestWithParam<OnFile> {
 
 TEST_P(ContractOnData, HasNoHolesSpillOvershootOrWrongValues) {
     ContractReport total;
-    for (const LatticeCase& at : lattices(32))
-        if (comparesBits(subject(), at)) total += expectContract(subject(), mesh_, at);
+    std::vector<LatticeCase> cases = lattices(32);
+    std::erase_if(cases, [&](const LatticeCase& at) { return !comparesBits(subject(), at); });
+    for (const LatticeCase& at : inTurn(subject(), cases, fileNumber()))
+        total += expectContract(subject(), mesh_, at);
     EXPECT_GT(total.inMesh, 0);
     RecordProperty("worst_accuracy_ratio", std::to_string(total.worstRatio));
     RecordProperty("covered", std::to_string(total.covered));

@@ -154,6 +154,15 @@ bool comparesBits(const Subject& subject, const LatticeCase& at) {
                : isOneOf(at.name, {"third offset", "cut plane"});
 }
 
+std::vector<LatticeCase> inTurn(const Subject& subject, const std::vector<LatticeCase>& cases,
+                                std::size_t turn) {
+    constexpr std::size_t kTurns = 3;
+    if (!isHurried() || !subject.isOnDevice() || cases.size() < kTurns) return cases;
+    std::vector<LatticeCase> some;
+    for (std::size_t i = turn % kTurns; i < cases.size(); i += kTurns) some.push_back(cases[i]);
+    return some;
+}
+
 int pointsFor(const Subject& subject, int points) {
     return subject.isPrimary ? points : (2 * points + 2) / 3;
 }

@@ -58,6 +58,9 @@ bool takes(const Subject& subject, const LatticeCase& at);
 /// The lattices on which bits are compared and real meshes checked; fewer on a device, where every run has
 /// its price.
 bool comparesBits(const Subject& subject, const LatticeCase& at);
+/// In a hurry a device takes a third of the cases: one mesh these, the next mesh those, by `turn`.
+std::vector<LatticeCase> inTurn(const Subject& subject, const std::vector<LatticeCase>& cases,
+                                std::size_t turn);
 /// Points along the longest side for a subject.
 int pointsFor(const Subject& subject, int points);
 

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -12,6 +11,7 @@
 #include <map>
 #include <sstream>
 
+#include "arguments.h"
 #include "hard_cases.h"
 #include "perturbed_cases.h"
 #include "tessera/registry.h"
@@ -260,27 +260,28 @@ bool updateFile(const std::string& path, const std::string& text) {
 int main(int argc, char** argv) {
     using namespace tessera::hard_cases;
     Arguments arguments;
-    CLI::App app("Measures the gallery of hard cases against exact arithmetic.");
-    app.add_option("--cells", arguments.cells, "lattice spacings along the longest side")->delimiter(',');
-    app.add_option("--format-cells", arguments.formatCells, "formats other than r32f up to this many");
-    app.add_option("--algorithms", arguments.algorithms, "all without this")->delimiter(',');
-    app.add_option("--only", arguments.only, "cases with this in their name");
-    app.add_option("--perturbed", arguments.perturbedOnProcessor, "random perturbed cases for software");
-    app.add_option("--perturbed-gl", arguments.perturbedOnDevice, "the same for each OpenGL algorithm");
-    app.add_option("--seed", arguments.seed, "the first perturbed case");
-    app.add_option("--update", arguments.update, "write the tables between the markers of this file");
-    CLI11_PARSE(app, argc, argv);
-    if (!arguments.update.empty() && (!arguments.only.empty() || !arguments.algorithms.empty())) {
-        fmt::print(stderr, "--update takes the whole gallery, without --only and --algorithms\n");
-        return 2;
-    }
-    Table table(arguments);
-    if (!table.run()) {
-        fmt::print(stderr, "no case has '{}' in its name\n", arguments.only);
-        return 2;
-    }
-    const std::string text = table.markdown();
-    std::fputs(text.c_str(), stdout);
-    if (!arguments.update.empty() && !updateFile(arguments.update, text)) return 1;
-    return table.isClean() ? 0 : 1;
+    tessera::bench::Arguments words("Measures the gallery of hard cases against exact arithmetic.");
+    words.add("--cells", arguments.cells, "lattice spacings along the longest side");
+    words.add("--format-cells", arguments.formatCells, "formats other than r32f up to this many");
+    words.add("--algorithms", arguments.algorithms, "all without this");
+    words.add("--only", arguments.only, "cases with this in their name");
+    words.add("--perturbed", arguments.perturbedOnProcessor, "random perturbed cases for software");
+    words.add("--perturbed-gl", arguments.perturbedOnDevice, "the same for each OpenGL algorithm");
+    words.add("--seed", arguments.seed, "the first perturbed case");
+    words.add("--update", arguments.update, "write the tables between the markers of this file");
+    return words.run(argc, argv, [&] {
+        if (!arguments.update.empty() && (!arguments.only.empty() || !arguments.algorithms.empty())) {
+            fmt::print(stderr, "--update takes the whole gallery, without --only and --algorithms\n");
+            return 2;
+        }
+        Table table(arguments);
+        if (!table.run()) {
+            fmt::print(stderr, "no case has '{}' in its name\n", arguments.only);
+            return 2;
+        }
+        const std::string text = table.markdown();
+        std::fputs(text.c_str(), stdout);
+        if (!arguments.update.empty() && !updateFile(arguments.update, text)) return 1;
+        return table.isClean() ? 0 : 1;
+    });
 }

@@ -1,6 +1,6 @@
-#include "vdb/vdb_file.h"
 #include "tessera/lattice.h"
 #include "vdb/shape_output.h"
+#include "vdb/vdb_file.h"
 
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
