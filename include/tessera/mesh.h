@@ -42,6 +42,9 @@ struct TetMesh {
     int findField(const std::string& name) const;
 };
 
+/// The indices of all fields, in order.
+std::vector<int> everyField(const TetMesh& mesh);
+
 /// Throws InputError, naming the element or field, when sizes or indices do not fit together.
 void checkMesh(const TetMesh& mesh);
 

@@ -1,7 +1,9 @@
 #include "brick/growing_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 
@@ -99,10 +101,24 @@ std::array<GrowingTree::Found, 8> GrowingTree::nearParents(const DepthKey& key) 
         return childNumber(ancestorKey(high, depth).index - first(depth));
     };
     std::array<Found, 8> block;
-    const unsigned rootAxes = axesOfTwo(Depth(0));
-    for (unsigned n = 0; n < 8; ++n)
-        if ((n & ~rootAxes) == 0) block[n] = {roots_.at(first(Depth(0)) + childOffset(n)), Depth(0)};
-    for (Depth depth = Depth(1); depth <= last; depth = depth + 1) {
+    // Down to the last ancestor that all have in common there is one way.
+    const Vec3i differ = low.index ^ high.index;
+    const int apart = std::bit_width(std::uint32_t(differ.x | differ.y | differ.z));
+    Depth depth{0};
+    if (apart <= last.halvings()) {
+        depth = last - apart;
+        block[0] = find({depth, first(depth)});
+        if (!block[0].entry.isSplit()) {
+            block.fill(block[0]);
+            return block;
+        }
+    } else {
+        const unsigned rootAxes = axesOfTwo(Depth(0));
+        for (unsigned n = 0; n < 8; ++n)
+            if ((n & ~rootAxes) == 0) block[n] = {roots_.at(first(Depth(0)) + childOffset(n)), Depth(0)};
+    }
+    while (depth < last) {
+        depth = depth + 1;
         const unsigned child = childNumber(first(depth)), axes = axesOfTwo(depth);
         // An upper brick has another parent than the lower one where that is its parent's upper child. The
         // last comes first, as bricks take the place of what they come from.
@@ -188,6 +204,19 @@ std::optional<GrowingLeaf> GrowingTree::findLeaf(const DepthKey& key) const {
     return GrowingLeaf{key, found.entry.slot()};
 }
 
+// The same, with nearParents() of the brick where it has a parent: in a large tree all these are far from the
+// processor, and are fetched at once.
+std::optional<GrowingLeaf> GrowingTree::findLeaf(const DepthKey& key, std::array<Found, 8>& parents) const {
+    if (key.depth <= Depth(0)) return findLeaf(key);
+    parents = nearParents(key);
+    const unsigned child = childNumber(key.index);
+    const Entry own = parents[child ^ 7].entry;
+    if (!own.isSplit()) return {};
+    const Entry entry = nodes_[own.node()].children[child];
+    if (!entry.isLeaf()) return {};
+    return GrowingLeaf{key, entry.slot()};
+}
+
 std::optional<GrowingLeaf> GrowingTree::findCovering(const DepthKey& key) const {
     const Found found = find(key);
     if (!found.entry.isLeaf()) return {};
@@ -268,13 +297,13 @@ void GrowingTree::splitOne(const GrowingLeaf& leaf, ChildBits children) {
 
 // Replaces the wave that was just split by the leaves that are now more than one depth above a leaf that they
 // touch. As the tree was balanced before, these are leaves that touch a child just made, and none of them was
-// made by the same call of split().
-void GrowingTree::findUnbalanced() {
+// made by the same call of split(). Of a wave of one brick nearParents() may be known.
+void GrowingTree::findUnbalanced(const std::array<Found, 8>* parentsOfOnly) {
     const std::size_t count = wave_.size();
     for (std::size_t i = 0; i < count; ++i) {
         const DepthKey key = wave_[i].key;
         if (key.depth == Depth(0)) continue;
-        const std::array<Found, 8> parents = nearParents(key);
+        const std::array<Found, 8> parents = parentsOfOnly ? *parentsOfOnly : nearParents(key);
         const unsigned own = childNumber(key.index) ^ 7;
         for (unsigned n = 0; n < 8; ++n) {
             // A parent touches the children that lie on its side.
@@ -314,11 +343,13 @@ bool GrowingTree::split(std::span<const DepthKey> keys, std::size_t maxLeaves, c
     change_.removed.clear();
     change_.added.clear();
     wave_.clear();
+    std::array<Found, 8> parents;
     for (const DepthKey& key : keys) {
-        const std::optional<GrowingLeaf> leaf = findLeaf(key);
+        const std::optional<GrowingLeaf> leaf = findLeaf(key, parents);
         TESSERA_CHECK(leaf, "only a leaf is split");
         wave_.push_back(*leaf);
     }
+    const std::array<Found, 8>* parentsOfOnly = keys.size() == 1 ? &parents : nullptr;
     try {
         while (!wave_.empty()) {
             waveChildren_.assign(wave_.size(), 0);
@@ -328,7 +359,7 @@ bool GrowingTree::split(std::span<const DepthKey> keys, std::size_t maxLeaves, c
                 undoSplits();
                 return false;
             }
-            findUnbalanced();
+            findUnbalanced(std::exchange(parentsOfOnly, nullptr));
         }
     } catch (...) {
         undoSplits();

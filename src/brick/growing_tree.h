@@ -118,6 +118,7 @@ class GrowingTree {
     Found find(const DepthKey& key) const;
     std::array<Found, 8> nearParents(const DepthKey& key) const;
     std::array<Found, 27> around(const DepthKey& key) const;
+    std::optional<GrowingLeaf> findLeaf(const DepthKey& key, std::array<Found, 8>& parents) const;
     Entry& entryOf(const DepthKey& key);
     template <class Visit>
     bool visitLeaves(Entry entry, const DepthKey& at, Visit&& visit) const;
@@ -126,7 +127,7 @@ class GrowingTree {
     bool holdsLeaf(Entry entry) const;
 
     void splitOne(const GrowingLeaf& leaf, ChildBits children);
-    void findUnbalanced();
+    void findUnbalanced(const std::array<Found, 8>* parentsOfOnly);
     void undoSplits();
     void endChange();
     std::uint32_t takeSlot();

@@ -57,7 +57,7 @@ class CompareRun {
         const ImportedMesh file =
             importMesh(path, {sourceNames(request_.fields, {}), request_.timeStep}, request_.repair, job_);
         const FieldSelection selection = selectFields(file.mesh, request_.fields);
-        const Box3d bounds = file.mesh.boundsWorld();
+        const Box3d bounds = file.boundsWorld;
         const SamplingGrid grid = request_.spacing ? cubicGridOfSpacing(bounds, *request_.spacing)
                                                    : cubicGrid(bounds, request_.resolution.value_or(128));
         CompareOptions options;

@@ -205,7 +205,7 @@ void CutRun::writePngFile() {
 std::string CutRun::resultText() const {
     const std::int64_t elements = result_.file.mesh.elementCount();
     const CutFrame& frame = result_.cut.frame;
-    std::string text = importText(request_.input, result_.file.statistics, result_.file.mesh.boundsWorld());
+    std::string text = importText(request_.input, result_.file.statistics, result_.file.boundsWorld);
     text +=
         fmt::format("  cut through {} elements: {} touched ({:.1f} %), {} hit\n", formatCount(elements),
                     formatCount(result_.cut.hits.touched),

@@ -133,7 +133,7 @@ Json showMesh(const DescribeRequest& request, const std::string& path, Job& job)
     const ImportedMesh file = importMesh(path, {{}, request.timeStep}, request.repair, job);
     StageTimes times;
     times.readMs = timer.elapsedMs();
-    const Box3d bounds = file.mesh.boundsWorld();
+    const Box3d& bounds = file.boundsWorld;
     const std::vector<FieldSummary> fields = summarizeFields(file.mesh);
     const ClassLimits limits = request.repair ? request.repair->limits : ClassLimits{};
     const ClassCounts classes =

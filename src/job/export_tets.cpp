@@ -25,7 +25,7 @@ TetsResult exportTets(const TetsRequest& request, Job& job) {
     job.execution.report(Stage::writing, 0, 1);
     writeTets(mesh, request.output);
     result.times.writeMs = timer.elapsedMs();
-    job.say(importText(request.input, result.mesh.statistics, mesh.boundsWorld()));
+    job.say(importText(request.input, result.mesh.statistics, result.mesh.boundsWorld));
     tellRepair(request.input, result.mesh, job);
     job.say(fmt::format("{}: {} tetrahedra\n", request.output, formatCount(mesh.elementCount())));
     return result;
@@ -37,7 +37,7 @@ Json tetsJson(const TetsRequest& request, const TetsResult& result) {
     json["input"] = request.input;
     json["output"] = request.output;
     json["stages"] = stagesJson(result.times);
-    json["mesh"] = meshJson(result.mesh.statistics, mesh.boundsWorld(), summarizeFields(mesh));
+    json["mesh"] = meshJson(result.mesh.statistics, result.mesh.boundsWorld, summarizeFields(mesh));
     addRepair(json, result.mesh);
     return json;
 }

@@ -8,6 +8,7 @@
 
 #include "base/timer.h"
 #include "job/series_steps.h"
+#include "refine/plan_frame.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -33,16 +34,18 @@ MeshFile openMesh(const std::string& path, const ReadOptions& options, Job& job)
 
 ImportedMesh importMesh(const std::string& path, const ReadOptions& read,
                         const std::optional<RepairOptions>& options, Job& job) {
-    ImportedMesh file{openMesh(path, read, job), options, {}, 0};
-    if (!options) return file;
-    Timer timer;
-    file.mesh = repair(std::move(file.mesh), *options, file.repair, job.execution);
-    file.repairMs = timer.elapsedMs();
-    if (file.mesh.tets.empty())
-        throw InputError(fmt::format(
-            "{}: --repair leaves nothing of {} elements, all of an aspect ratio below {:g}: a smaller "
-            "--repair-aspect or --repair-max-volume-loss keeps those whose volume isn't zero",
-            path, file.repair.elementsBefore, options->limits.minAspect));
+    ImportedMesh file{openMesh(path, read, job), options, {}, 0, {}};
+    if (options) {
+        Timer timer;
+        file.mesh = repair(std::move(file.mesh), *options, file.repair, job.execution);
+        file.repairMs = timer.elapsedMs();
+        if (file.mesh.tets.empty())
+            throw InputError(fmt::format(
+                "{}: --repair leaves nothing of {} elements, all of an aspect ratio below {:g}: a smaller "
+                "--repair-aspect or --repair-max-volume-loss keeps those whose volume isn't zero",
+                path, file.repair.elementsBefore, options->limits.minAspect));
+    }
+    file.boundsWorld = meshBounds(file.mesh, job.execution.withoutProgress(), nullptr);
     return file;
 }
 

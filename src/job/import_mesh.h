@@ -14,6 +14,7 @@ struct ImportedMesh : MeshFile {
     std::optional<RepairOptions> repairOptions;  ///< none: it was taken as it is
     RepairReport repair;
     double repairMs = 0;
+    Box3d boundsWorld;  ///< TetMesh::boundsWorld()
 };
 
 /// Reads a mesh as the job is to read them; of a .pvd file the step that the options name. Throws as readMesh

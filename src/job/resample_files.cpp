@@ -208,7 +208,7 @@ Json ResampleRun::runStep(const ResampleStep& step) {
     job_.say(text);
     if (!request_.dryRun) fellShort(step, shortfalls(result, request_));
     report["stages"] = stagesJson(times);
-    report["mesh"] = meshJson(file.statistics, file.mesh.boundsWorld(), summarizeFields(file.mesh));
+    report["mesh"] = meshJson(file.statistics, file.boundsWorld, summarizeFields(file.mesh));
     addRepair(report, file);
     report.update(stepJson(result, request_));
     report["peak_memory_bytes"] = peakMemoryBytes(job_);
@@ -235,7 +235,7 @@ Json ResampleRun::documentOf(const ResampleStep& step) const {
 void ResampleRun::sayImport(const ResampleStep& step, const ImportedMesh& file, const StepPlan& plan) {
     ImportStatistics shown = file.statistics;
     std::erase_if(shown.warnings, [this](const std::string& w) { return !saidWarnings_.insert(w).second; });
-    job_.say(importText(step.input, shown, file.mesh.boundsWorld()) +
+    job_.say(importText(step.input, shown, file.boundsWorld) +
              (step.source.time ? fmt::format("  time {}\n", *step.source.time) : std::string()) +
              plan.namesText);
     tellRepair(step.input, file, job_);

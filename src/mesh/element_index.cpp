@@ -333,10 +333,10 @@ bool ElementIndex::clip(const Box3d& boxWorld, MappedBox& box) const {
     return true;
 }
 
-void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box,
+void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box, std::size_t most,
                          std::vector<std::int32_t>& elements) const {
     const Node& node = levels_[level][std::size_t(n)];
-    for (std::size_t c = 0; c < kWidth; ++c) {
+    for (std::size_t c = 0; c < kWidth && elements.size() <= most; ++c) {
         const Meeting meeting = meetingOf(node, c, box);
         if (meeting == Meeting::apart) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
@@ -344,7 +344,7 @@ void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box
             const std::span<const std::int32_t> all = elementsBelow(level, below);
             elements.insert(elements.end(), all.begin(), all.end());
         } else if (level > 0) {
-            query(level - 1, below, box, elements);
+            query(level - 1, below, box, most, elements);
         } else {
             const std::span<const std::int32_t> group = elementsBelow(level, below);
             unsigned met =
@@ -372,12 +372,12 @@ std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const Mapped
     return sum;
 }
 
-void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements) const {
+void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements, std::size_t most) const {
     MappedBox box;
     if (!clip(boxWorld, box)) return;
     const std::size_t first = elements.size();
-    query(levels_.size() - 1, 0, box, elements);
-    sortAscending(elements, first);
+    query(levels_.size() - 1, 0, box, most, elements);
+    if (elements.size() <= most) sortAscending(elements, first);
 }
 
 std::int64_t ElementIndex::count(const Box3d& boxWorld) const {

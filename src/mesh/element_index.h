@@ -20,6 +20,8 @@ namespace tessera {
 /// on the mesh only, not on threads. Thread-safe after construction; doesn't refer to the mesh.
 class ElementIndex {
   public:
+    static constexpr std::size_t kEvery = ~std::size_t(0);
+
     ElementIndex() = default;
     explicit ElementIndex(const TetMesh& mesh, const Execution& execution = {});
 
@@ -30,7 +32,8 @@ class ElementIndex {
 
     /// Appends, ascending, every element whose bounding box meets the closed box, and besides at most those
     /// whose box comes closer than 1/256 of the extent of its group of eight neighbours.
-    void query(const Box3d& boxWorld, std::vector<std::int32_t>& elements) const;
+    /// Stops when there are more than `most` in the list: it is of no use then.
+    void query(const Box3d& boxWorld, std::vector<std::int32_t>& elements, std::size_t most = kEvery) const;
 
     /// How many elements query() finds, or a few more: microseconds, whatever the box holds.
     std::int64_t count(const Box3d& boxWorld) const;
@@ -73,7 +76,7 @@ class ElementIndex {
     std::span<const std::int32_t> elementsBelow(std::size_t level, std::int64_t child) const;
     /// False when the box meets no element at all.
     bool clip(const Box3d& boxWorld, MappedBox& box) const;
-    void query(std::size_t level, std::int64_t node, const MappedBox& box,
+    void query(std::size_t level, std::int64_t node, const MappedBox& box, std::size_t most,
                std::vector<std::int32_t>& elements) const;
     std::int64_t count(std::size_t level, std::int64_t node, const MappedBox& box) const;
 

@@ -1,5 +1,7 @@
 #include "tessera/mesh.h"
 
+#include <numeric>
+
 #include "tessera/error.h"
 
 namespace tessera {
@@ -15,6 +17,12 @@ int TetMesh::findField(const std::string& name) const {
     for (std::size_t f = 0; f < fields.size(); ++f)
         if (fields[f].name == name) return int(f);
     return -1;
+}
+
+std::vector<int> everyField(const TetMesh& mesh) {
+    std::vector<int> all(mesh.fields.size());
+    std::iota(all.begin(), all.end(), 0);
+    return all;
 }
 
 void checkMesh(const TetMesh& mesh) {

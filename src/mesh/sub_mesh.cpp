@@ -77,27 +77,33 @@ class NodeNumbers {
 
     void numberMany() {
         struct Word {
-            std::uint64_t bits = 0;
+            std::uint32_t bits = 0;
             std::int32_t before = 0;  // nodes of the words before
         };
         const auto [least, most] = std::minmax_element(places_.begin(), places_.end());
         const std::int32_t first = *least;
-        std::vector<Word> words(std::size_t(*most - first) / 64 + 1);
+        std::vector<Word> words(std::size_t(*most - first) / 32 + 1);
         for (const std::int32_t node : places_) {
             const std::size_t bit = std::size_t(node - first);
-            words[bit / 64].bits |= std::uint64_t(1) << bit % 64;
+            words[bit / 32].bits |= std::uint32_t(1) << bit % 32;
         }
         for (std::size_t w = 0; w < words.size(); ++w) {
             words[w].before = std::int32_t(nodes_.size());
-            for (std::uint64_t bits = words[w].bits; bits != 0; bits &= bits - 1)
-                nodes_.push_back(first + std::int32_t(64 * w) + std::countr_zero(bits));
+            for (std::uint32_t bits = words[w].bits; bits != 0; bits &= bits - 1)
+                nodes_.push_back(first + std::int32_t(32 * w) + std::countr_zero(bits));
         }
         for (std::int32_t& node : places_) {
             const std::size_t bit = std::size_t(node - first);
-            const Word& word = words[bit / 64];
-            const std::uint64_t below = (std::uint64_t(1) << bit % 64) - 1;
-            node = word.before + std::popcount(word.bits & below);
+            const Word& word = words[bit / 32];
+            node = word.before + bitCount(word.bits & ((std::uint32_t(1) << bit % 32) - 1));
         }
+    }
+
+    /// std::popcount() is a call where the processor isn't known to have it.
+    static std::int32_t bitCount(std::uint32_t bits) {
+        bits -= (bits >> 1) & 0x55555555;
+        bits = (bits & 0x33333333) + ((bits >> 2) & 0x33333333);
+        return std::int32_t(((bits + (bits >> 4)) & 0x0f0f0f0f) * 0x01010101 >> 24);
     }
 
     std::vector<std::int32_t> places_, nodes_;

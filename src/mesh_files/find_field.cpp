@@ -1,7 +1,5 @@
 #include "mesh_files/find_field.h"
 
-#include <numeric>
-
 #include "mesh_files/read_mesh.h"
 #include "tessera/error.h"
 
@@ -20,12 +18,6 @@ int findField(const TetMesh& mesh, const std::vector<int>& among, const std::str
     if (found < 0)
         throw InputError("no field named '" + called + "'; there are: " + (there.empty() ? "none" : there));
     return found;
-}
-
-std::vector<int> everyField(const TetMesh& mesh) {
-    std::vector<int> all(mesh.fields.size());
-    std::iota(all.begin(), all.end(), 0);
-    return all;
 }
 
 }  // namespace tessera

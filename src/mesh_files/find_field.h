@@ -11,7 +11,4 @@ namespace tessera {
 /// where a cell field has the name too. Throws InputError, listing those fields, when there is none.
 int findField(const TetMesh& mesh, const std::vector<int>& among, const std::string& called);
 
-/// Indices of all fields.
-std::vector<int> everyField(const TetMesh& mesh);
-
 }  // namespace tessera

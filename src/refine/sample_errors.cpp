@@ -63,7 +63,6 @@ class Measurement {
     SampleErrors run();
 
   private:
-    std::vector<std::uint8_t> usedByVolume() const;
     std::vector<Part> measureNodes(const std::vector<std::uint8_t>& used);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
@@ -120,17 +119,6 @@ Part Measurement::newPart() const {
     for (std::size_t f = 0; f < part.sums.size(); ++f)
         part.sums[f].integralMesh.assign(std::size_t(samples_.fields()[f].field->components), 0);
     return part;
-}
-
-std::vector<std::uint8_t> Measurement::usedByVolume() const {
-    std::vector<std::uint8_t> used(mesh_.points.size(), 0);
-    for (const auto& tet : mesh_.tets) {
-        const bool flat =
-            volumeSign(mesh_.points[std::size_t(tet[0])], mesh_.points[std::size_t(tet[1])],
-                       mesh_.points[std::size_t(tet[2])], mesh_.points[std::size_t(tet[3])]) == 0;
-        for (std::size_t i = 0; !flat && i < 4; ++i) used[std::size_t(tet[i])] = 1;
-    }
-    return used;
 }
 
 // Sets the corners' addresses when all eight are stored and covered.
@@ -401,7 +389,8 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
 
 SampleErrors Measurement::run() {
     // A leaf's largest error can't be taken back, so it needs to know the samples exactly from the start.
-    const std::vector<std::uint8_t> used = leafErrors_ ? usedByVolume() : usedNodes(mesh_, execution_);
+    const std::vector<std::uint8_t> used =
+        leafErrors_ ? nodesOfVolumes(mesh_, execution_) : usedNodes(mesh_, execution_);
     std::vector<Part> nodes = measureNodes(used);
     const std::vector<Part> elements = measureElements();
     SampleErrors result;
@@ -409,7 +398,7 @@ SampleErrors Measurement::run() {
     addSums(elements, result);
     if (result.flatElements > 0) {
         // Nodes of flat elements alone are no samples after all.
-        const std::vector<std::uint8_t> exact = usedByVolume();
+        const std::vector<std::uint8_t> exact = nodesOfVolumes(mesh_, execution_);
         if (exact != used) {
             for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
             nodes = measureNodes(exact);

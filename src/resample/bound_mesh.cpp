@@ -66,16 +66,14 @@ std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const I
                                        const Execution& execution) const {
     if (!wantsIndex(lattice, boxes)) return std::nullopt;
     const ElementIndex& index = index_->get(execution);
-    if (route_ == Route::automatic) {
-        std::int64_t near = 0;
-        const auto most = std::int64_t(kLargestShare * double(index.elementCount()));
-        for (const IndexBox& box : boxes) {
-            near += index.count(boundsWorld(lattice, box, kNearMarginVoxels));
-            if (near > most) return std::nullopt;
-        }
-    }
+    const std::size_t most = route_ == Route::automatic
+                                 ? std::size_t(kLargestShare * double(index.elementCount()))
+                                 : ElementIndex::kEvery;
     std::vector<std::int32_t> elements;
-    for (const IndexBox& box : boxes) index.query(boundsWorld(lattice, box, kNearMarginVoxels), elements);
+    for (const IndexBox& box : boxes) {
+        index.query(boundsWorld(lattice, box, kNearMarginVoxels), elements, most);
+        if (elements.size() > most) return std::nullopt;
+    }
     if (boxes.size() > 1) {
         sortAscending(elements);
         elements.erase(std::unique(elements.begin(), elements.end()), elements.end());

@@ -84,28 +84,6 @@ struct alignas(64) BatchChannel {
     float step;                        // difference from voxel to voxel
 };
 
-/// Rows of a group of eight scanlines for a strip of `count` rows along t: lane -> (t, r) offset.
-struct alignas(64) RowTable {
-    double t[kBatch + 1][kBatch], r[kBatch + 1][kBatch];
-    int perVector[kBatch + 1];  // rows along r in one group
-};
-inline const RowTable& rowTable() {
-    static const RowTable table = [] {
-        RowTable rows{};
-        for (int count = 1; count <= kBatch; ++count) {
-            rows.perVector[count] = kBatch / count;
-            for (int lane = 0; lane < kBatch; ++lane) {
-                const bool used = lane < count * rows.perVector[count];
-                rows.t[count][lane] = lane % count;
-                // An unused lane lies beyond every element.
-                rows.r[count][lane] = used ? lane / count : 1e18;
-            }
-        }
-        return rows;
-    }();
-    return table;
-}
-
 struct Scratch {
     Batch batch;
     std::vector<BatchChannel> channels;
@@ -417,22 +395,42 @@ HWY_INLINE void writeSimpleRun(Walk& walk, const Rows& rows, int row) {
         return;
     }
     std::int32_t* const owner = walk.output.owner + rows.offset[row];
-    std::int32_t free = owner[0];
-    for (int k = 1; k < length; ++k) free &= owner[k];
-    if (free != kNoOwner) {
+    const BatchChannel& channel = walk.scratch.channels[0];
+    float* const out = walk.output.values[0] + rows.offset[row];
+    const auto value = float(channel.first[row]);
+    const auto skipped = float(rows.skipped[row]);
+    const float step = channel.step, low = channel.low[walk.lane], high = channel.high[walk.lane];
+    const std::int32_t element = walk.element;
+    // Few branches that depend on the length: two vectors that overlap in the middle.
+    const hn::CappedTag<float, 4> df;
+    const hn::RebindToSigned<decltype(df)> di;
+    const auto valuesAt = [&](auto number) {
+        const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
+        const auto raised = hn::IfThenElse(hn::Lt(v, hn::Set(df, low)), hn::Set(df, low), v);
+        return hn::IfThenElse(hn::Gt(raised, hn::Set(df, high)), hn::Set(df, high), raised);
+    };
+    if (length >= 4) {
+        const int last = length - 4;
+        const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
+        if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
+            writeContestedRun(walk, rows, row);
+            return;
+        }
+        hn::StoreU(hn::Set(di, element), di, owner);
+        hn::StoreU(hn::Set(di, element), di, owner + last);
+        hn::StoreU(valuesAt(hn::Iota(df, skipped)), df, out);
+        hn::StoreU(valuesAt(hn::Iota(df, skipped + float(last))), df, out + last);
+        return;
+    }
+    const int middle = length / 2, last = length - 1;
+    if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) {
         writeContestedRun(walk, rows, row);
         return;
     }
-    const BatchChannel& channel = walk.scratch.channels[0];
-    const float value = float(channel.first[row]), step = channel.step;
-    const float low = channel.low[walk.lane], high = channel.high[walk.lane];
-    float* const out = walk.output.values[0] + rows.offset[row];
-    const std::int32_t element = walk.element;
-    int count = int(rows.skipped[row]);
-    for (int k = 0; k < length; ++k, ++count) {
-        owner[k] = element;
-        out[k] = limited(value + float(count) * step, low, high);
-    }
+    owner[0] = owner[middle] = owner[last] = element;
+    out[0] = limited(value + skipped * step, low, high);
+    out[middle] = limited(value + (skipped + float(middle)) * step, low, high);
+    out[last] = limited(value + (skipped + float(last)) * step, low, high);
 }
 
 // True for scanlines whose ends differ too much when the faces are moved inwards instead of outwards.
@@ -481,7 +479,6 @@ template <int Lower>
 void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const double (&to)[3]) {
     const D d;
     const hn::Rebind<std::int32_t, D> di;
-    const RowTable& table = rowTable();
     const Batch& batch = walk.scratch.batch;
     const int lane = walk.lane;
     const std::size_t channels = walk.input.channels.size();
@@ -490,62 +487,70 @@ void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const 
     const V fromS = hn::Set(d, from[0]), toS = hn::Set(d, to[0]), toR = hn::Set(d, to[2]);
     const V origin = hn::Set(d, double(walk.origin)), strideS = hn::Set(d, double(walk.strideS)),
             strideT = hn::Set(d, double(walk.strideT)), strideR = hn::Set(d, double(walk.strideR));
+    // The rows, along t and then along r, a vector of them at a time.
+    const double countT = to[1] - from[1] + 1, total = countT * (to[2] - from[2] + 1);
+    const auto lanes = double(hn::Lanes(d));
+    const double stepR = std::floor(lanes / countT);
+    const V perRow = hn::Set(d, countT), aheadR = hn::Set(d, stepR),
+            aheadT = hn::Set(d, lanes - stepR * countT), one = hn::Set(d, 1.0);
+    const V numbers = hn::Iota(d, 0.0), firstR = hn::Floor(hn::Div(numbers, perRow));
+    V nextT = hn::Sub(numbers, hn::Mul(firstR, perRow)), nextR = hn::Add(firstR, hn::Set(d, from[2]));
+    walk.counts.scanlines += std::int64_t(total);
     Rows rows;
-    for (double t0 = from[1]; t0 <= to[1]; t0 += kBatch) {
-        const int count = int(std::min<double>(kBatch, to[1] - t0 + 1));
-        const int perVector = table.perVector[count];
-        for (double r0 = from[2]; r0 <= to[2]; r0 += perVector) {
-            unsigned hit = 0;
-            for (std::size_t q = 0; q < kBatch; q += hn::Lanes(d)) {
-                const V t = hn::Add(hn::Set(d, t0), hn::Load(d, &table.t[count][q]));
-                const V r = hn::Add(hn::Set(d, r0), hn::Load(d, &table.r[count][q]));
-                V low = minS, high = maxS;
-                for (int i = 0; i < 4; ++i) {
-                    const int face = order[i];
-                    const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane]),
-                                                    hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
-                                            hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
-                    if (i < Lower)
-                        low = hn::Max(low, bound);
-                    else
-                        high = hn::Min(high, bound);
-                }
-                V begin = hn::Ceil(low), end = hn::Floor(high);
-                if (isDoubtful) {
-                    const auto used = hn::Le(r, toR);
-                    const auto doubtful =
-                        hn::And(used, doubtfulEnds<Lower>(batch, lane, order, t, r, minS, maxS, begin, end));
-                    if (!hn::AllFalse(d, doubtful)) decideEnds(walk, doubtful, t, r, begin, end);
-                }
-                const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
-                const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
-                if (hn::AllFalse(d, inside)) continue;
-                const V offset = hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
-                                         hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR)));
-                const V length = hn::Add(hn::Sub(clippedEnd, clippedBegin), hn::Set(d, 1.0));
-                hn::Store(hn::DemoteTo(di, offset), di, rows.offset + q);
-                hn::Store(hn::DemoteTo(di, length), di, rows.length + q);
-                hn::Store(hn::Sub(clippedBegin, begin), d, rows.skipped + q);
-                std::uint8_t bits[8] = {};
-                hn::StoreMaskBits(d, inside, bits);
-                hit |= unsigned(bits[0]) << q;
-                for (std::size_t c = 0; c < channels; ++c) {
-                    BatchChannel& channel = walk.scratch.channels[c];
-                    const V value = hn::Add(hn::Add(hn::Add(hn::Set(d, channel.constant[lane]),
-                                                            hn::Mul(hn::Set(d, channel.gradientT[lane]), t)),
-                                                    hn::Mul(hn::Set(d, channel.gradientR[lane]), r)),
-                                            hn::Mul(hn::Set(d, channel.gradientS[lane]), begin));
-                    hn::Store(value, d, channel.first + q);
-                }
+    for (double done = 0; done < total; done += kBatch) {
+        unsigned hit = 0;
+        for (std::size_t q = 0; q < kBatch; q += hn::Lanes(d)) {
+            const V t = hn::Add(hn::Set(d, from[1]), nextT), r = nextR;
+            nextT = hn::Add(nextT, aheadT);
+            nextR = hn::Add(nextR, aheadR);
+            const auto over = hn::Ge(nextT, perRow);
+            nextT = hn::IfThenElse(over, hn::Sub(nextT, perRow), nextT);
+            nextR = hn::IfThenElse(over, hn::Add(nextR, one), nextR);
+            V low = minS, high = maxS;
+            for (int i = 0; i < 4; ++i) {
+                const int face = order[i];
+                const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane]),
+                                                hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
+                                        hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
+                if (i < Lower)
+                    low = hn::Max(low, bound);
+                else
+                    high = hn::Min(high, bound);
             }
-            walk.counts.scanlines += count * perVector;
-            for (unsigned ahead = hit; ahead; ahead &= ahead - 1)
-                __builtin_prefetch(walk.output.owner + rows.offset[std::countr_zero(ahead)], 1);
-            if (walk.simple) {
-                for (; hit; hit &= hit - 1) writeSimpleRun(walk, rows, std::countr_zero(hit));
-            } else {
-                for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
+            V begin = hn::Ceil(low), end = hn::Floor(high);
+            if (isDoubtful) {
+                const auto used = hn::Le(r, toR);
+                const auto doubtful =
+                    hn::And(used, doubtfulEnds<Lower>(batch, lane, order, t, r, minS, maxS, begin, end));
+                if (!hn::AllFalse(d, doubtful)) decideEnds(walk, doubtful, t, r, begin, end);
             }
+            const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
+            const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
+            if (hn::AllFalse(d, inside)) continue;
+            const V offset = hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
+                                     hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR)));
+            const V length = hn::Add(hn::Sub(clippedEnd, clippedBegin), one);
+            hn::Store(hn::DemoteTo(di, offset), di, rows.offset + q);
+            hn::Store(hn::DemoteTo(di, length), di, rows.length + q);
+            hn::Store(hn::Sub(clippedBegin, begin), d, rows.skipped + q);
+            std::uint8_t bits[8] = {};
+            hn::StoreMaskBits(d, inside, bits);
+            hit |= unsigned(bits[0]) << q;
+            for (std::size_t c = 0; c < channels; ++c) {
+                BatchChannel& channel = walk.scratch.channels[c];
+                const V value = hn::Add(hn::Add(hn::Add(hn::Set(d, channel.constant[lane]),
+                                                        hn::Mul(hn::Set(d, channel.gradientT[lane]), t)),
+                                                hn::Mul(hn::Set(d, channel.gradientR[lane]), r)),
+                                        hn::Mul(hn::Set(d, channel.gradientS[lane]), begin));
+                hn::Store(value, d, channel.first + q);
+            }
+        }
+        for (unsigned ahead = hit; ahead; ahead &= ahead - 1)
+            __builtin_prefetch(walk.output.owner + rows.offset[std::countr_zero(ahead)], 1);
+        if (walk.simple) {
+            for (; hit; hit &= hit - 1) writeSimpleRun(walk, rows, std::countr_zero(hit));
+        } else {
+            for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
         }
     }
 }

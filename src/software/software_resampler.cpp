@@ -6,7 +6,6 @@
 #include <limits>
 #include <memory>
 #include <mutex>
-#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -106,12 +105,6 @@ std::vector<ScanChannel> channelsOf(const TetMesh& mesh, std::span<const int> fi
                 {field.values.data(), field.components, c, field.location == FieldLocation::cell});
     }
     return channels;
-}
-
-std::vector<int> everyField(const TetMesh& mesh) {
-    std::vector<int> fields(mesh.fields.size());
-    std::iota(fields.begin(), fields.end(), 0);
-    return fields;
 }
 
 class BoundSoftware : public BoundResampler {

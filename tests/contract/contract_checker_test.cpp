@@ -23,7 +23,7 @@ constexpr ContractBounds kBounds;
 struct Setting {
     Setting(TetMesh given, const Lattice& lattice, const IndexBox& box)
         : mesh(std::move(given)),
-          fields(allFields(mesh)),
+          fields(everyField(mesh)),
           oracle(mesh, lattice),
           reference(referenceBlock(oracle, box, {.toleranceVoxels = kBounds.spillVoxels})),
           block(resampleBlock(OracleResampler(), mesh, fields, lattice, box)) {}

@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <mutex>
-#include <numeric>
 #include <utility>
 
 #include "base/parallel.h"
@@ -167,12 +166,6 @@ int pointsFor(const Subject& subject, int points) {
     return subject.isPrimary ? points : (2 * points + 2) / 3;
 }
 
-std::vector<int> allFields(const TetMesh& mesh) {
-    std::vector<int> fields(mesh.fields.size());
-    std::iota(fields.begin(), fields.end(), 0);
-    return fields;
-}
-
 std::vector<Block> sample(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,
                           const Lattice& lattice, std::span<const IndexBox> boxes, const Sampling& sampling) {
     std::vector<Block> blocks(boxes.size());
@@ -248,7 +241,7 @@ std::string describe(const LatticeCase& at) {
 }  // namespace
 
 Measure::Measure(const TetMesh& mesh, const LatticeCase& at, const Execution& execution)
-    : at_(at), execution_(execution), oracle_(mesh, at.lattice), fields_(allFields(mesh)) {}
+    : at_(at), execution_(execution), oracle_(mesh, at.lattice), fields_(everyField(mesh)) {}
 
 ContractReport Measure::operator()(const Subject& subject, const Block& block, const CheckOptions& options) {
     const ContractBounds bounds = subject.bounds();
@@ -263,7 +256,7 @@ ContractReport Measure::operator()(const Subject& subject, const Block& block, c
 
 ContractReport measureContract(const Subject& subject, const TetMesh& mesh, const LatticeCase& at,
                                const CheckOptions& options) {
-    const Block block = sample(subject, mesh, allFields(mesh), at.lattice, at.box);
+    const Block block = sample(subject, mesh, everyField(mesh), at.lattice, at.box);
     return Measure(mesh, at)(subject, block, options);
 }
 
@@ -311,7 +304,7 @@ TetMesh withCompany(const TetMesh& mesh, const LatticeCase& at, SampleFormat for
 
 std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& mesh, const LatticeCase& at) {
     const Resampler& resampler = *subject.resampler;
-    const std::vector<int> fields = allFields(mesh);
+    const std::vector<int> fields = everyField(mesh);
     const std::span one(&at.box, 1);
     const Block whole = sample(subject, mesh, fields, at.lattice, at.box);
     std::vector<std::string> changed;

@@ -64,8 +64,6 @@ std::vector<LatticeCase> inTurn(const Subject& subject, const std::vector<Lattic
 /// Points along the longest side for a subject.
 int pointsFor(const Subject& subject, int points);
 
-std::vector<int> allFields(const TetMesh& mesh);
-
 struct Sampling {
     BindOptions bind;
     int threads = 1;

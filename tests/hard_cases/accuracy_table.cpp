@@ -125,7 +125,7 @@ class Table {
 
     void sampleAndMeasure(const HardCase& hardCase, const TetMesh& mesh, const LatticeCase& at,
                           contract::Measure& measure, const Subject& subject, Row& row) {
-        const std::vector<int> fields = contract::allFields(mesh);
+        const std::vector<int> fields = everyField(mesh);
         const Block block = std::move(contract::sample(*subject.resampler, mesh, fields, at.lattice,
                                                        std::span(&at.box, 1), {subject.bindOptions(), 2})[0]);
         const ContractReport report = measure(subject, block);

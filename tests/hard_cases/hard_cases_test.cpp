@@ -68,7 +68,7 @@ class HardCases : public testing::TestWithParam<OnCase> {
 
 TEST_P(HardCases, MeetTheContract) {
     for (const LatticeCase& at : lattices()) {
-        const std::vector<int> fields = contract::allFields(mesh_);
+        const std::vector<int> fields = everyField(mesh_);
         const Block block = contract::sample(subject(), mesh_, fields, at.lattice, at.box);
         const ContractReport report = contract::Measure(mesh_, at)(subject(), block);
         EXPECT_TRUE(report.isClean())
@@ -82,7 +82,7 @@ TEST_P(HardCases, MeetTheContract) {
 TEST_P(HardCases, ThinnestElementsAreMet) {
     if (hardCase().isLarge) GTEST_SKIP() << "large";
     const std::vector<LatticeCase> lattices = latticesThroughThinnest(mesh_, subject().isOnDevice() ? 2 : 8);
-    const std::vector<int> fields = contract::allFields(mesh_);
+    const std::vector<int> fields = everyField(mesh_);
     for (const LatticeCase& at : lattices) {
         const Block block = contract::sample(subject(), mesh_, fields, at.lattice, at.box);
         const ContractReport report = contract::Measure(mesh_, at)(subject(), block);
@@ -197,7 +197,7 @@ class HardCaseHashes : public testing::TestWithParam<HardCase> {};
 TEST_P(HardCaseHashes, AreThoseListed) {
     if (contract::isHurried() && GetParam().isLarge) GTEST_SKIP() << "large";
     const TetMesh mesh = GetParam().make();
-    const std::vector<int> fields = contract::allFields(mesh);
+    const std::vector<int> fields = everyField(mesh);
     const Resampler& software = findResampler("software");
     struct Way {
         std::string target;
