@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <limits>
 #include <memory>
 #include <string>
 
@@ -9,7 +8,7 @@ namespace tessera::bench {
 
 /// What a number may be.
 struct Range {
-    int least = 1, most = std::numeric_limits<int>::max();
+    int least = 0, most = 0;
 };
 
 /// The words of a program's command line. CLI11 reads them; it is slow to compile and stands in one source.
