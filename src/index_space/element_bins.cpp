@@ -184,11 +184,16 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
             const Vec3i low = glm::max(Vec3i{bounds.low[0], bounds.low[1], bounds.low[2]}, all.min);
             const Vec3i high = glm::min(Vec3i{bounds.high[0], bounds.high[1], bounds.high[2]}, all.max - 1);
             if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
+            if (regions.size() == 1) {
+                found.push_back({0, std::int32_t(e)});
+                continue;
+            }
             grid.forEachRegion(low, high, [&](std::int32_t region) {
                 found.push_back({region, std::int32_t(e)});
                 ++count[std::size_t(region)];
             });
         }
+        if (regions.size() == 1) count[0] = std::int32_t(found.size());
     });
     for (std::size_t r = 0; r < regions.size(); ++r) {
         std::int64_t next = bins.first[r];

@@ -1,7 +1,6 @@
 #include "refine/error_samples.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +9,7 @@
 #include "brick/leaf_tiles.h"
 #include "mesh/field_range.h"
 #include "mesh/geometry.h"
+#include "refine/used_nodes.h"
 
 namespace tessera {
 
@@ -58,10 +58,7 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
                 if (!(std::abs(sixfold.value) > sixfold.errorBound) && exactVolumeSign(a, b, c, d) == 0)
                     continue;
                 volume_[std::size_t(e)] = elementVolume(sixfold.value);
-                for (const std::int32_t node : tet) {
-                    std::atomic_ref<std::uint8_t> used(usedNode_[std::size_t(node)]);
-                    if (!used.load(std::memory_order_relaxed)) used.store(1, std::memory_order_relaxed);
-                }
+                markNodes(tet, usedNode_);
             }
         });
 }

@@ -3,8 +3,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <string>
+#include <vector>
 
 #include "base/parallel.h"
 #include "base/text.h"
@@ -48,20 +51,83 @@ double finestSpacing(const RefineOptions& options, double longest) {
 
 }  // namespace
 
+namespace {
+
+constexpr std::int64_t kBoundsChunk = 16384;
+
+/// A box of nodes, and for each of its six sides a node on it.
+struct Extent {
+    Box3d box;
+    std::array<std::int32_t, 6> node{-1, -1, -1, -1, -1, -1};  // at the lower ends, then at the upper ones
+    void include(const Vec3d& point, std::int32_t n) {
+        for (int a = 0; a < 3; ++a) {
+            lower(a, point[a], n);
+            raise(a, point[a], n);
+        }
+    }
+    void include(const Extent& other) {
+        for (int a = 0; a < 3; ++a) {
+            lower(a, other.box.min[a], other.node[std::size_t(a)]);
+            raise(a, other.box.max[a], other.node[std::size_t(a + 3)]);
+        }
+    }
+
+  private:
+    void lower(int axis, double value, std::int32_t n) {
+        if (!(value < box.min[axis])) return;
+        box.min[axis] = value;
+        node[std::size_t(axis)] = n;
+    }
+    void raise(int axis, double value, std::int32_t n) {
+        if (!(value > box.max[axis])) return;
+        box.max[axis] = value;
+        node[std::size_t(axis + 3)] = n;
+    }
+};
+
+template <class Counts>
+Extent extentOf(const TetMesh& mesh, const Execution& execution, const Counts& counts) {
+    std::vector<Extent> parts(std::size_t((mesh.nodeCount() + kBoundsChunk - 1) / kBoundsChunk));
+    parallelForChunks(execution, mesh.nodeCount(), kBoundsChunk, [&](std::int64_t begin, std::int64_t end) {
+        Extent part;
+        for (std::int64_t n = begin; n < end; ++n)
+            if (counts(n)) part.include(mesh.points[std::size_t(n)], std::int32_t(n));
+        parts[std::size_t(begin / kBoundsChunk)] = part;
+    });
+    Extent all;
+    for (const Extent& part : parts) all.include(part);
+    return all;
+}
+
+bool elementsUse(const std::array<std::int32_t, 6>& nodes, const TetMesh& mesh, const Execution& execution) {
+    std::array<bool, 256> isCandidate{};  // by the last bits: a table that stays in the nearest cache
+    for (const std::int32_t n : nodes) isCandidate[std::size_t(n) & 255] = true;
+    constexpr unsigned kAll = 63;
+    std::atomic<unsigned> used{0};
+    parallelForChunks(execution, mesh.elementCount(), kBoundsChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          if (used.load(std::memory_order_relaxed) == kAll) return;
+                          unsigned found = 0;
+                          for (std::int64_t e = begin; e < end; ++e)
+                              for (const std::int32_t n : mesh.tets[std::size_t(e)]) {
+                                  if (!isCandidate[std::size_t(n) & 255]) continue;
+                                  for (std::size_t side = 0; side < 6; ++side)
+                                      if (nodes[side] == n) found |= 1u << side;
+                              }
+                          used.fetch_or(found, std::memory_order_relaxed);
+                      });
+    return used == kAll;
+}
+
+}  // namespace
+
 Box3d meshBounds(const TetMesh& mesh, const Execution& execution, const ElementIndex* index) {
     if (index) return index->boundsWorld();
-    constexpr std::int64_t kChunk = 16384;
+    // Nodes that no element uses don't count; there hardly ever are any.
+    const Extent all = extentOf(mesh, execution, [](std::int64_t) { return true; });
+    if (elementsUse(all.node, mesh, execution)) return all.box;
     const std::vector<std::uint8_t> used = usedNodes(mesh, execution);
-    std::vector<Box3d> parts(std::size_t((mesh.nodeCount() + kChunk - 1) / kChunk));
-    parallelForChunks(execution, mesh.nodeCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
-        Box3d box;
-        for (std::int64_t n = begin; n < end; ++n)
-            if (used[std::size_t(n)]) box.include(mesh.points[std::size_t(n)]);
-        parts[std::size_t(begin / kChunk)] = box;
-    });
-    Box3d all;
-    for (const Box3d& part : parts) all.include(part);
-    return all;
+    return extentOf(mesh, execution, [&](std::int64_t n) { return used[std::size_t(n)] != 0; }).box;
 }
 
 void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options) {

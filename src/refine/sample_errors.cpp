@@ -1,5 +1,6 @@
 #include "refine/sample_errors.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -63,7 +64,8 @@ class Measurement {
     SampleErrors run();
 
   private:
-    std::vector<Part> measureNodes(const std::vector<std::uint8_t>& used);
+    template <class IsSample>
+    std::vector<Part> measureNodes(const IsSample& isSample);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
     void locate(Batch& batch) const;
@@ -88,7 +90,8 @@ class Measurement {
     std::optional<Box3d> bounds_;  // from the tree's origin
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
-    std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
+    std::vector<std::uint8_t> usedNodes_;  // by elements with a volume
+    std::atomic<std::int64_t> done_{0};    // pieces of work, see advance
 };
 
 Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, const BrickStore& store,
@@ -230,16 +233,16 @@ void Measurement::measureBatch(Batch& batch, Part& part) {
     }
 }
 
-std::vector<Part> Measurement::measureNodes(const std::vector<std::uint8_t>& used) {
+template <class IsSample>
+std::vector<Part> Measurement::measureNodes(const IsSample& isSample) {
     std::vector<Part> parts(std::size_t((mesh_.nodeCount() + kErrorChunk - 1) / kErrorChunk));
     parallelForChunks(execution_, mesh_.nodeCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
         Batch batch(samples_.channels());
         for (std::int64_t n = begin; n < end; ++n) {
-            const std::size_t node = std::size_t(n);
-            if (used[node]) {
-                batch.sample[batch.count] = std::uint32_t(node);
-                batch.placeWorld[batch.count] = samples_.placeWorld(node, tree_.originWorld());
+            if (isSample(n)) {
+                batch.sample[batch.count] = std::uint32_t(n);
+                batch.placeWorld[batch.count] = samples_.placeWorld(std::size_t(n), tree_.originWorld());
                 batch.volume[batch.count] = 0;
                 for (const SampledField& field : samples_.fields())
                     for (int c = 0; !field.isCell() && c < field.field->components; ++c)
@@ -265,11 +268,13 @@ void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& ba
                                ? nullptr
                                : samples_.fields()[0].field->values.data();
     const int stride = values ? samples_.fields()[0].field->components : 0;
+    const float* nodeErrors = values ? lists_[0].data() : nullptr;
     batch.count = 0;
     for (std::int64_t e = begin; e < end; ++e) {
         for (const std::int32_t node : mesh_.tets[std::size_t(std::min(e + kPrefetch, last))]) {
             __builtin_prefetch(&mesh_.points[std::size_t(node)]);
             if (values) __builtin_prefetch(values + std::int64_t(node) * stride);
+            if (nodeErrors) __builtin_prefetch(nodeErrors + node);
         }
         const auto& tet = mesh_.tets[std::size_t(e)];
         const Vec3d &a = mesh_.points[std::size_t(tet[0])], &b = mesh_.points[std::size_t(tet[1])],
@@ -280,6 +285,7 @@ void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& ba
         part.flat += sign == 0;
         part.inverted += sign < 0;
         if (sign == 0) continue;
+        markNodes(tet, usedNodes_);
         const std::size_t sample = samples_.nodeCount() + std::size_t(e), i = batch.count++;
         batch.sample[i] = std::uint32_t(sample);
         batch.volume[i] = elementVolume(sixfold.value);
@@ -388,21 +394,22 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
 }
 
 SampleErrors Measurement::run() {
-    // A leaf's largest error can't be taken back, so it needs to know the samples exactly from the start.
-    const std::vector<std::uint8_t> used =
-        leafErrors_ ? nodesOfVolumes(mesh_, execution_) : usedNodes(mesh_, execution_);
-    std::vector<Part> nodes = measureNodes(used);
+    // Nearly always every node is a sample. Elements tell whether it is so; but a leaf's largest error can't
+    // be taken back, so there it has to be known from the start.
+    if (leafErrors_) {
+        usedNodes_ = nodesOfVolumes(mesh_, execution_);
+    } else {
+        usedNodes_.assign(mesh_.points.size(), 0);
+    }
+    const auto isSample = [&](std::int64_t node) { return !leafErrors_ || usedNodes_[std::size_t(node)]; };
+    std::vector<Part> nodes = measureNodes(isSample);
     const std::vector<Part> elements = measureElements();
     SampleErrors result;
     result.sums = newPart().sums;
     addSums(elements, result);
-    if (result.flatElements > 0) {
-        // Nodes of flat elements alone are no samples after all.
-        const std::vector<std::uint8_t> exact = nodesOfVolumes(mesh_, execution_);
-        if (exact != used) {
-            for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
-            nodes = measureNodes(exact);
-        }
+    if (!leafErrors_ && std::find(usedNodes_.begin(), usedNodes_.end(), 0) != usedNodes_.end()) {
+        for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
+        nodes = measureNodes([&](std::int64_t node) { return usedNodes_[std::size_t(node)] != 0; });
     }
     addSums(nodes, result);
     for (const Part& part : nodes) result.nodes += part.inside;

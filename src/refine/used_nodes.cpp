@@ -1,7 +1,5 @@
 #include "refine/used_nodes.h"
 
-#include <atomic>
-
 #include "base/parallel.h"
 #include "mesh/geometry.h"
 
@@ -17,12 +15,7 @@ std::vector<std::uint8_t> nodesOfElements(const TetMesh& mesh, const Execution& 
     parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t e = begin; e < end; ++e) {
             const auto& tet = mesh.tets[std::size_t(e)];
-            if (!counts(tet)) continue;
-            for (const std::int32_t node : tet) {
-                // Reading first keeps the cache line shared once it is marked.
-                std::atomic_ref<std::uint8_t> mark(used[std::size_t(node)]);
-                if (!mark.load(std::memory_order_relaxed)) mark.store(1, std::memory_order_relaxed);
-            }
+            if (counts(tet)) markNodes(tet, used);
         }
     });
     return used;

@@ -7,8 +7,9 @@
 // so every instruction set gives the same bits.
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -30,9 +31,13 @@
 namespace tessera::scan_kernel {
 
 inline constexpr int kBatch = 8;
-/// Runs of at least this many voxels along x are filled a vector at a time.
-inline constexpr int kLongRun = 8;
+/// So many rows of elements are solved before their runs are written.
+inline constexpr int kMostRows = 256;
+/// Runs of up to so many voxels along x are written without a loop.
+inline constexpr int kShortRun = 8;
 inline constexpr double kUnit = 0x1p-53;
+/// Nodes of a mesh that take less than this are near at hand without being fetched ahead.
+inline constexpr std::size_t kCacheBytes = std::size_t(1) << 19;
 /// An axis other than x is scanned when the element is this many times longer along it: rows along x are
 /// contiguous in memory.
 inline constexpr double kAxisGain = 4.0;
@@ -61,10 +66,10 @@ inline constexpr double kEasy = 2;
 struct alignas(64) Batch {
     double whole[4][3][kBatch], part[4][3][kBatch];  // node places
     double planeA[4][kBatch], planeB[4][kBatch], planeC[4][kBatch];
-    double lower[4][kBatch];                                        // 1 when face i bounds s from below
-    double base[3][kBatch];                                         // first voxel, x y z
-    double axis[kBatch];                                            // scan axis
-    double minS[kBatch], maxS[kBatch];                              // widened bounds
+    double lower[kBatch];               // sum of 2^i over the faces i that bound s from below
+    double base[3][kBatch];             // first voxel, x y z
+    double axis[kBatch];                // scan axis
+    double minS[kBatch], maxS[kBatch];  // widened bounds
     double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];  // whole numbers
     double grade[kBatch];                                           // kThin, kDoubtful or kEasy
     double shrink[4][kBatch];  // added to planeA: the face moved inwards by as much as it was moved outwards
@@ -79,14 +84,56 @@ struct alignas(64) BatchChannel {
     bool finite[kBatch];
     bool inDouble[kBatch];  // a run's values don't come out right in float: denormal steps, too many of them,
                             // or steps that overflow
-    // Of the element and group of scanlines at work:
-    alignas(64) double first[kBatch];  // value at the first voxel of each scanline's run
-    float step;                        // difference from voxel to voxel
+    float step[kBatch];     // difference from voxel to voxel along the scan axis
+    // Of the rows at work:
+    alignas(64) double first[kMostRows];  // value at the first voxel of the run
+    alignas(64) double alongT[kBatch];    // what t adds to the constant
 };
+
+/// Rows of the elements at work: where each one's run starts in the block, how long it is there, how many of
+/// its voxels lie before the region, and how far behind it a window of voxels has to start to end in the
+/// region.
+struct alignas(64) Rows {
+    std::int32_t offset[kMostRows], length[kMostRows], skipped[kMostRows];
+    std::uint16_t hit[kMostRows + 4];  // the rows that have a run: row + kMostRows lane
+    int count = 0, hits = 0;
+};
+
+/// The places of the set bits of four, 16 bits each from the lowest on, and their count.
+struct SetBits {
+    std::uint64_t places;
+    int count;
+};
+constexpr auto kSetBits = [] {
+    std::array<SetBits, 16> table{};
+    for (unsigned bits = 0; bits < 16; ++bits)
+        for (unsigned place = 0; place < 4; ++place)
+            if (bits >> place & 1) table[bits].places |= std::uint64_t(place) << 16 * table[bits].count++;
+    return table;
+}();
+
+/// The faces of an element, those first that bound s from below, by a bit for each that does.
+struct FaceOrder {
+    std::uint8_t face[4], lower;
+};
+constexpr auto kFaceOrder = [] {
+    std::array<FaceOrder, 16> table{};
+    for (unsigned bits = 0; bits < 16; ++bits) {
+        std::uint8_t upper = 4;
+        for (std::uint8_t k = 0; k < 4; ++k)
+            table[bits].face[bits >> k & 1 ? table[bits].lower++ : --upper] = k;
+    }
+    return table;
+}();
 
 struct Scratch {
     Batch batch;
     std::vector<BatchChannel> channels;
+    Rows rows;
+    // Of the batch's elements:
+    std::int32_t element[kBatch];
+    std::int64_t stride[kBatch];  // along the scan axis
+    int longest[kBatch];          // runs up to this length are written by windows
 };
 
 }  // namespace tessera::scan_kernel
@@ -102,6 +149,11 @@ using M = decltype(hn::Eq(V(), V()));
 
 HWY_INLINE V abs3(V a, V b, V c) {
     return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c));
+}
+HWY_INLINE unsigned bitsOf(M mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(D(), mask, bits);
+    return bits[0];
 }
 HWY_INLINE V dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
     return hn::Add(hn::Add(hn::Mul(a0, b0), hn::Mul(a1, b1)), hn::Mul(a2, b2));
@@ -194,6 +246,7 @@ void setUpLanes(Batch& batch, std::size_t lane) {
               &batch.grade[lane]);
 
     const V tiny = hn::Set(d, 1.0 / kParallel);
+    V lower = hn::Zero(d);
     for (int k = 0; k < 4; ++k) {
         const V s = g[k][0];
         const V reciprocal = hn::IfThenElse(hn::Lt(hn::Abs(s), tiny), hn::Set(d, kParallel), hn::Div(one, s));
@@ -201,10 +254,12 @@ void setUpLanes(Batch& batch, std::size_t lane) {
         hn::Store(hn::Mul(hn::Add(dilation, dilation), reciprocal), d, &batch.shrink[k][lane]);
         hn::Store(hn::Neg(hn::Mul(g[k][1], reciprocal)), d, &batch.planeB[k][lane]);
         hn::Store(hn::Neg(hn::Mul(g[k][2], reciprocal)), d, &batch.planeC[k][lane]);
-        hn::Store(hn::IfThenElseZero(hn::Gt(reciprocal, hn::Zero(d)), one), d, &batch.lower[k][lane]);
+        lower =
+            hn::Add(lower, hn::IfThenElseZero(hn::Gt(reciprocal, hn::Zero(d)), hn::Set(d, double(1 << k))));
         hn::Store(c[k], d, &batch.constant[k][lane]);
         for (int a = 0; a < 3; ++a) hn::Store(g[k][a], d, &batch.gradient[k][a][lane]);
     }
+    hn::Store(lower, d, &batch.lower[lane]);
 }
 
 // value = f0 + sum over i of (fi - f0) b_i.
@@ -263,29 +318,20 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
             for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
     }
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpChannelLanes(batch, channel, lane);
+    constexpr double kLimit = std::numeric_limits<float>::max();
+    for (int lane = 0; lane < kBatch; ++lane)
+        channel.step[lane] = float(std::clamp(channel.gradientS[lane], -kLimit, kLimit));
 }
 
-// The state of one element while its scanlines are walked.
+// What is scanned, into what.
 struct Walk {
     const ScanInput& input;
     const ScanOutput& output;
     Scratch& scratch;
     ScanCounts& counts;
-    std::int32_t element;
-    int lane;
-    std::int64_t strideS, strideT, strideR;
-    std::int64_t origin;  // offset of the element's first voxel in the block (may lie outside)
-    int axis;
-    bool simple;  // see writeSimpleRun
+    double regionMin[3], regionLast[3], blockMin[3], stride[3];  // of the output, x y z
     std::optional<ElementDepth> depth;
-    std::optional<ExactScanlines> exact;
-};
-
-// A group of scanlines: where each one's run starts in the block, how long it is there, and how many of its
-// voxels lie before the region.
-struct alignas(64) Rows {
-    std::int32_t offset[kBatch], length[kBatch];
-    double skipped[kBatch];
+    std::int32_t depthOf = kNoOwner;
 };
 
 HWY_INLINE float limited(float value, float low, float high) {
@@ -293,22 +339,23 @@ HWY_INLINE float limited(float value, float low, float high) {
     return value > high ? high : value;
 }
 
-float valueAt(const BatchChannel& channel, int lane, int row, double step) {
+float valueAt(const BatchChannel& channel, int lane, int row, double number) {
     if (!channel.finite[lane]) return std::numeric_limits<float>::quiet_NaN();
-    const float value = channel.inDouble[lane] ? float(channel.first[row] + step * channel.gradientS[lane])
-                                               : float(channel.first[row]) + float(step) * channel.step;
+    const float value = channel.inDouble[lane]
+                            ? float(channel.first[row] + number * channel.gradientS[lane])
+                            : float(channel.first[row]) + float(number) * channel.step[lane];
     return limited(value, channel.low[lane], channel.high[lane]);
 }
 
 // The element's rank at a point it covers. On a face, where conforming meshes are contested, it is zero, and
 // a look at the barycentrics tells: one that is worth less than 2^-15 voxel, which leaves the errors of both
 // ways of computing it inside the step of 2^-13.
-double rankOf(Walk& walk, std::int64_t offset) {
+double rankOf(Walk& walk, int lane, std::int64_t offset) {
     const Batch& batch = walk.scratch.batch;
-    const int lane = walk.lane;
     const Vec3i point = walk.output.pointAt(offset);
     if (batch.grade[lane] == kEasy) {
-        const int axes[3] = {walk.axis, walk.axis == 0 ? 1 : 0, walk.axis == 2 ? 1 : 2};
+        const int axis = int(batch.axis[lane]);
+        const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};
         double local[3];
         for (int i = 0; i < 3; ++i) local[i] = point[axes[i]] - batch.base[axes[i]][lane];
         for (int k = 0; k < 4; ++k) {
@@ -318,26 +365,29 @@ double rankOf(Walk& walk, std::int64_t offset) {
             if (b < 0x1p-15 * std::max({std::fabs(gs), std::fabs(gt), std::fabs(gr)})) return 0.0;
         }
     }
-    if (!walk.depth) walk.depth.emplace(walk.input.mesh, walk.input.frame, walk.element);
+    const std::int32_t element = walk.scratch.element[lane];
+    if (walk.depthOf != element) walk.depth.emplace(walk.input.mesh, walk.input.frame, element);
+    walk.depthOf = element;
     return walk.depth->rank(point);
 }
 
 // Points of the run that another element covers already: the deeper one owns them.
-HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
+HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
     const Scratch& scratch = walk.scratch;
+    const Rows& rows = scratch.rows;
+    const std::int32_t element = scratch.element[lane];
     std::int64_t offset = rows.offset[row];
-    for (int k = 0; k < rows.length[row]; ++k, offset += walk.strideS) {
+    for (int k = 0; k < rows.length[row]; ++k, offset += scratch.stride[lane]) {
         std::int32_t& owner = walk.output.owner[offset];
         if (owner == kNoOwner) {
-            owner = walk.element;
+            owner = element;
         } else {
             ++walk.counts.contested;
-            if (!contestPoint(walk.input, walk.output, walk.element, rankOf(walk, offset), offset)) continue;
+            if (!contestPoint(walk.input, walk.output, element, rankOf(walk, lane, offset), offset)) continue;
         }
-        const double step = rows.skipped[row] + k;
-        for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
-            walk.output.values[c][offset] = valueAt(scratch.channels[c], walk.lane, row, step);
-        }
+        const double number = double(rows.skipped[row]) + k;
+        for (std::size_t c = 0; c < scratch.channels.size(); ++c)
+            walk.output.values[c][offset] = valueAt(scratch.channels[c], lane, row, number);
     }
 }
 
@@ -345,10 +395,10 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, const Rows& rows, int row) {
 // they don't depend on the region.
 HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped, float value, float step,
                         float low, float high) {
+    const hn::ScalableTag<float> df;
+    const int lanes = int(hn::Lanes(df));
     int k = 0;
-    if (stride == 1 && length >= kLongRun) {
-        const hn::ScalableTag<float> df;
-        const int lanes = int(hn::Lanes(df));
+    if (stride == 1) {
         const auto lowest = hn::Set(df, low), highest = hn::Set(df, high), slope = hn::Set(df, step),
                    first = hn::Set(df, value);
         for (; k + lanes <= length; k += lanes) {
@@ -361,94 +411,107 @@ HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped
     for (; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
 }
 
-HWY_INLINE void writeRun(Walk& walk, const Rows& rows, int row) {
-    const int length = rows.length[row];
-    const std::int64_t offset = rows.offset[row];
+HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
+    const Scratch& scratch = walk.scratch;
+    const int length = scratch.rows.length[row], skipped = scratch.rows.skipped[row];
+    const std::int64_t offset = scratch.rows.offset[row], stride = scratch.stride[lane];
     std::int32_t* const owner = walk.output.owner + offset;
-    const std::int64_t stride = walk.strideS;
     std::int32_t free = kNoOwner;
     for (int k = 0; k < length; ++k) free &= owner[k * stride];
     if (free != kNoOwner) {
-        writeContestedRun(walk, rows, row);
+        writeContestedRun(walk, lane, row);
         return;
     }
-    for (int k = 0; k < length; ++k) owner[k * stride] = walk.element;
-    const Scratch& scratch = walk.scratch;
+    for (int k = 0; k < length; ++k) owner[k * stride] = scratch.element[lane];
     for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
-        if (channel.finite[walk.lane] && !channel.inDouble[walk.lane]) {
-            fillRun(out, stride, length, int(rows.skipped[row]), float(channel.first[row]), channel.step,
-                    channel.low[walk.lane], channel.high[walk.lane]);
+        if (channel.finite[lane] && !channel.inDouble[lane]) {
+            fillRun(out, stride, length, skipped, float(channel.first[row]), channel.step[lane],
+                    channel.low[lane], channel.high[lane]);
         } else {
             for (int k = 0; k < length; ++k)
-                out[k * stride] = valueAt(channel, walk.lane, row, rows.skipped[row] + k);
+                out[k * stride] = valueAt(channel, lane, row, double(skipped) + k);
         }
     }
 }
 
-// The common case, in one loop: one channel, finite, in float, along x, a short run.
-HWY_INLINE void writeSimpleRun(Walk& walk, const Rows& rows, int row) {
-    const int length = rows.length[row];
-    if (length >= kLongRun) {
-        writeRun(walk, rows, row);
-        return;
-    }
-    std::int32_t* const owner = walk.output.owner + rows.offset[row];
-    const BatchChannel& channel = walk.scratch.channels[0];
-    float* const out = walk.output.values[0] + rows.offset[row];
-    const auto value = float(channel.first[row]);
-    const auto skipped = float(rows.skipped[row]);
-    const float step = channel.step, low = channel.low[walk.lane], high = channel.high[walk.lane];
-    const std::int32_t element = walk.element;
-    // Few branches that depend on the length: two vectors that overlap in the middle.
-    const hn::CappedTag<float, 4> df;
-    const hn::RebindToSigned<decltype(df)> di;
-    const auto valuesAt = [&](auto number) {
-        const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
-        const auto raised = hn::IfThenElse(hn::Lt(v, hn::Set(df, low)), hn::Set(df, low), v);
-        return hn::IfThenElse(hn::Gt(raised, hn::Set(df, high)), hn::Set(df, high), raised);
-    };
-    if (length >= 4) {
-        const int last = length - 4;
-        const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
-        if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
-            writeContestedRun(walk, rows, row);
-            return;
+// Writes the runs of the rows at work. Most are short, and of no length that can be foreseen: those of
+// elements that allow it are written without a branch, with the voxels beside them as they were.
+void writeRows(Walk& walk) {
+    Scratch& scratch = walk.scratch;
+    Rows& rows = scratch.rows;
+    std::int32_t* const owners = walk.output.owner;
+    const int hits = rows.hits;
+    float* const values = walk.output.values.empty() ? nullptr : walk.output.values[0];
+    for (int i = 0; i < hits; ++i) {
+        const int row = rows.hit[i] % kMostRows, lane = rows.hit[i] / kMostRows;
+        const int length = rows.length[row];
+        if (length > scratch.longest[lane]) {
+            writeRun(walk, lane, row);
+            continue;
         }
-        hn::StoreU(hn::Set(di, element), di, owner);
-        hn::StoreU(hn::Set(di, element), di, owner + last);
-        hn::StoreU(valuesAt(hn::Iota(df, skipped)), df, out);
-        hn::StoreU(valuesAt(hn::Iota(df, skipped + float(last))), df, out + last);
-        return;
+        const BatchChannel& channel = scratch.channels[0];
+        std::int32_t* const owner = owners + rows.offset[row];
+        float* const out = values + rows.offset[row];
+        const std::int32_t element = scratch.element[lane];
+        const auto value = float(channel.first[row]);
+        const auto skipped = float(rows.skipped[row]);
+        const float step = channel.step[lane], low = channel.low[lane], high = channel.high[lane];
+        const hn::CappedTag<float, 4> df;
+        const hn::RebindToSigned<decltype(df)> di;
+        const auto valuesAt = [&](auto number) {
+            const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
+            const auto raised = hn::IfThenElse(hn::Lt(v, hn::Set(df, low)), hn::Set(df, low), v);
+            return hn::IfThenElse(hn::Gt(raised, hn::Set(df, high)), hn::Set(df, high), raised);
+        };
+        if (length >= 4) {
+            const int last = length - 4;
+            const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
+            if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
+                writeContestedRun(walk, lane, row);
+                continue;
+            }
+            hn::StoreU(hn::Set(di, element), di, owner);
+            hn::StoreU(hn::Set(di, element), di, owner + last);
+            hn::StoreU(valuesAt(hn::Iota(df, skipped)), df, out);
+            hn::StoreU(valuesAt(hn::Iota(df, skipped + float(last))), df, out + last);
+            continue;
+        }
+        const int middle = length / 2, last = length - 1;
+        if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) {
+            writeContestedRun(walk, lane, row);
+            continue;
+        }
+        owner[0] = owner[middle] = owner[last] = element;
+        alignas(16) float v[4];
+        hn::Store(valuesAt(hn::Iota(df, skipped)), df, v);
+        out[0] = v[0];
+        out[middle] = v[middle];
+        out[last] = v[last];
     }
-    const int middle = length / 2, last = length - 1;
-    if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) {
-        writeContestedRun(walk, rows, row);
-        return;
-    }
-    owner[0] = owner[middle] = owner[last] = element;
-    out[0] = limited(value + skipped * step, low, high);
-    out[middle] = limited(value + (skipped + float(middle)) * step, low, high);
-    out[last] = limited(value + (skipped + float(last)) * step, low, high);
+    rows.count = rows.hits = 0;
 }
 
-// True for scanlines whose ends differ too much when the faces are moved inwards instead of outwards.
-template <int Lower>
-HWY_INLINE M doubtfulEnds(const Batch& batch, int lane, const int (&order)[4], V t, V r, V minS, V maxS,
-                          V begin, V end) {
-    const D d;
-    V low = minS, high = maxS;
+/// Elements with scanlines that double precision can't decide are solved by code of their own.
+constexpr int kCarefully = 5;
+
+// Where faces leave scanlines room: s from the greatest bound of the first `lower` faces to the least of the
+// others. A face's bound is what t gives and C r.
+HWY_INLINE void narrow(int lower, const V (&alongT)[4], const V (&planeC)[4], V r, V& low, V& high) {
     for (int i = 0; i < 4; ++i) {
-        const int face = order[i];
-        const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane] + batch.shrink[face][lane]),
-                                        hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
-                                hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
-        if (i < Lower)
+        const V bound = hn::Add(alongT[i], hn::Mul(planeC[i], r));
+        if (i < lower)
             low = hn::Max(low, bound);
         else
             high = hn::Min(high, bound);
     }
+}
+
+// True for scanlines between whose ends, and those when the faces are moved inwards instead of outwards, low
+// and high, lies a voxel.
+HWY_INLINE M doubtfulEnds(V low, V high, V begin, V end) {
+    const D d;
     // Where the scanline surely meets the element, an end within the tolerance of it is as good as exact.
     const V tolerance = hn::Set(d, kEndTolerance);
     const auto lowDiffers = hn::And(hn::Ne(hn::Ceil(low), begin), hn::Gt(hn::Sub(low, begin), tolerance));
@@ -457,165 +520,166 @@ HWY_INLINE M doubtfulEnds(const Batch& batch, int lane, const int (&order)[4], V
 }
 
 // Replaces the ends of the scanlines that double precision can't decide.
-HWY_NOINLINE void decideEnds(Walk& walk, M doubtful, V t, V r, V& begin, V& end) {
+HWY_NOINLINE void decideEnds(const ExactScanlines& exact, unsigned doubtful, V t, V r, V& begin, V& end) {
     const D d;
     alignas(64) double ts[kBatch], rs[kBatch], begins[kBatch], ends[kBatch];
-    std::uint8_t bits[8] = {};
     hn::Store(t, d, ts);
     hn::Store(r, d, rs);
     hn::Store(begin, d, begins);
     hn::Store(end, d, ends);
-    hn::StoreMaskBits(d, doubtful, bits);
-    if (!walk.exact) walk.exact.emplace(walk.input, walk.element, walk.axis);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i)
-        if ((bits[0] >> i) & 1) walk.exact->ends(ts[i], rs[i], begins[i], ends[i]);
+        if ((doubtful >> i) & 1) exact.ends(ts[i], rs[i], begins[i], ends[i]);
     begin = hn::Load(d, begins);
     end = hn::Load(d, ends);
 }
 
-// Scanlines of one element inside the region; `Lower` of the four faces, those first in `order`, bound s from
-// below.
+// The part of an element that lies in the region, relative to its first voxel: s, t and r.
+struct Part {
+    double from[3], to[3];
+    double origin, stride[3];  // offset of the first voxel in the block (may lie outside); s, t and r
+    bool isWithin;             // no run is cut
+    bool isAlongX;
+};
+
+// Solves the rows of one element, a vector of them along t and then along r; `Lower` of the four faces bound
+// s from below, or kCarefully.
 template <int Lower>
-void walkRows(Walk& walk, const int (&order)[4], const double (&from)[3], const double (&to)[3]) {
+void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
     const D d;
     const hn::Rebind<std::int32_t, D> di;
-    const Batch& batch = walk.scratch.batch;
-    const int lane = walk.lane;
-    const std::size_t channels = walk.input.channels.size();
-    const bool isDoubtful = batch.grade[lane] == kDoubtful;
-    const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]);
-    const V fromS = hn::Set(d, from[0]), toS = hn::Set(d, to[0]), toR = hn::Set(d, to[2]);
-    const V origin = hn::Set(d, double(walk.origin)), strideS = hn::Set(d, double(walk.strideS)),
-            strideT = hn::Set(d, double(walk.strideT)), strideR = hn::Set(d, double(walk.strideR));
-    // The rows, along t and then along r, a vector of them at a time.
-    const double countT = to[1] - from[1] + 1, total = countT * (to[2] - from[2] + 1);
-    const auto lanes = double(hn::Lanes(d));
-    const double stepR = std::floor(lanes / countT);
-    const V perRow = hn::Set(d, countT), aheadR = hn::Set(d, stepR),
-            aheadT = hn::Set(d, lanes - stepR * countT), one = hn::Set(d, 1.0);
-    const V numbers = hn::Iota(d, 0.0), firstR = hn::Floor(hn::Div(numbers, perRow));
-    V nextT = hn::Sub(numbers, hn::Mul(firstR, perRow)), nextR = hn::Add(firstR, hn::Set(d, from[2]));
-    walk.counts.scanlines += std::int64_t(total);
-    Rows rows;
-    for (double done = 0; done < total; done += kBatch) {
-        unsigned hit = 0;
-        for (std::size_t q = 0; q < kBatch; q += hn::Lanes(d)) {
-            const V t = hn::Add(hn::Set(d, from[1]), nextT), r = nextR;
-            nextT = hn::Add(nextT, aheadT);
-            nextR = hn::Add(nextR, aheadR);
-            const auto over = hn::Ge(nextT, perRow);
-            nextT = hn::IfThenElse(over, hn::Sub(nextT, perRow), nextT);
-            nextR = hn::IfThenElse(over, hn::Add(nextR, one), nextR);
-            V low = minS, high = maxS;
-            for (int i = 0; i < 4; ++i) {
-                const int face = order[i];
-                const V bound = hn::Add(hn::Add(hn::Set(d, batch.planeA[face][lane]),
-                                                hn::Mul(hn::Set(d, batch.planeB[face][lane]), t)),
-                                        hn::Mul(hn::Set(d, batch.planeC[face][lane]), r));
-                if (i < Lower)
-                    low = hn::Max(low, bound);
-                else
-                    high = hn::Min(high, bound);
-            }
-            V begin = hn::Ceil(low), end = hn::Floor(high);
-            if (isDoubtful) {
-                const auto used = hn::Le(r, toR);
-                const auto doubtful =
-                    hn::And(used, doubtfulEnds<Lower>(batch, lane, order, t, r, minS, maxS, begin, end));
-                if (!hn::AllFalse(d, doubtful)) decideEnds(walk, doubtful, t, r, begin, end);
-            }
-            const V clippedBegin = hn::Max(begin, fromS), clippedEnd = hn::Min(end, toS);
-            const auto inside = hn::And(hn::Le(clippedBegin, clippedEnd), hn::Le(r, toR));
-            if (hn::AllFalse(d, inside)) continue;
-            const V offset = hn::Add(hn::Add(origin, hn::Mul(clippedBegin, strideS)),
-                                     hn::Add(hn::Mul(t, strideT), hn::Mul(r, strideR)));
-            const V length = hn::Add(hn::Sub(clippedEnd, clippedBegin), one);
-            hn::Store(hn::DemoteTo(di, offset), di, rows.offset + q);
-            hn::Store(hn::DemoteTo(di, length), di, rows.length + q);
-            hn::Store(hn::Sub(clippedBegin, begin), d, rows.skipped + q);
-            std::uint8_t bits[8] = {};
-            hn::StoreMaskBits(d, inside, bits);
-            hit |= unsigned(bits[0]) << q;
-            for (std::size_t c = 0; c < channels; ++c) {
-                BatchChannel& channel = walk.scratch.channels[c];
-                const V value = hn::Add(hn::Add(hn::Add(hn::Set(d, channel.constant[lane]),
-                                                        hn::Mul(hn::Set(d, channel.gradientT[lane]), t)),
-                                                hn::Mul(hn::Set(d, channel.gradientR[lane]), r)),
-                                        hn::Mul(hn::Set(d, channel.gradientS[lane]), begin));
-                hn::Store(value, d, channel.first + q);
-            }
+    constexpr int kLanes = int(hn::MaxLanes(d));
+    Scratch& scratch = walk.scratch;
+    const Batch& batch = scratch.batch;
+    Rows& rows = scratch.rows;
+    BatchChannel* const channels = scratch.channels.data();
+    const std::size_t channelCount = scratch.channels.size();
+    const int lower = Lower == kCarefully ? order.lower : Lower;
+    const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]),
+            strideS = hn::Set(d, part.stride[0]), strideR = hn::Set(d, part.stride[2]), one = hn::Set(d, 1.0);
+    V planeC[4];
+    for (int i = 0; i < 4; ++i) planeC[i] = hn::Set(d, batch.planeC[order.face[i]][lane]);
+    std::optional<ExactScanlines> exact;
+    const int countT = int(part.to[1] - part.from[1]) + 1, countR = int(part.to[2] - part.from[2]) + 1;
+    walk.counts.scanlines += std::int64_t(countT) * countR;
+    for (int done = 0; done < countT; done += kLanes) {
+        const unsigned used = (1u << std::min(countT - done, kLanes)) - 1;
+        const V t = hn::Iota(d, part.from[1] + done);
+        V alongT[4], inner[4];
+        for (int i = 0; i < 4; ++i) {
+            const int face = order.face[i];
+            const V plane = hn::Mul(hn::Set(d, batch.planeB[face][lane]), t);
+            alongT[i] = hn::Add(hn::Set(d, batch.planeA[face][lane]), plane);
+            if (Lower == kCarefully)
+                inner[i] = hn::Add(hn::Set(d, batch.planeA[face][lane] + batch.shrink[face][lane]), plane);
         }
-        for (unsigned ahead = hit; ahead; ahead &= ahead - 1)
-            __builtin_prefetch(walk.output.owner + rows.offset[std::countr_zero(ahead)], 1);
-        if (walk.simple) {
-            for (; hit; hit &= hit - 1) writeSimpleRun(walk, rows, std::countr_zero(hit));
-        } else {
-            for (; hit; hit &= hit - 1) writeRun(walk, rows, std::countr_zero(hit));
+        for (std::size_t c = 0; c < channelCount; ++c)
+            hn::Store(hn::Add(hn::Set(d, channels[c].constant[lane]),
+                              hn::Mul(hn::Set(d, channels[c].gradientT[lane]), t)),
+                      d, channels[c].alongT);
+        V r = hn::Set(d, part.from[2]);
+        V rowOffset = hn::Add(hn::Set(d, part.origin),  // of s = 0
+                              hn::Add(hn::Mul(t, hn::Set(d, part.stride[1])), hn::Mul(r, strideR)));
+        for (int left = countR; left > 0;) {
+            if (rows.count == kMostRows) writeRows(walk);
+            const int some = std::min(left, (kMostRows - rows.count) / kLanes);
+            left -= some;
+            int hits = rows.hits;
+            for (int at = rows.count; at < rows.count + some * kLanes; at += kLanes) {
+                V low = minS, high = maxS;
+                narrow(lower, alongT, planeC, r, low, high);
+                V begin = hn::Ceil(low), end = hn::Floor(high);
+                if (Lower == kCarefully) {
+                    V innerLow = minS, innerHigh = maxS;
+                    narrow(lower, inner, planeC, r, innerLow, innerHigh);
+                    const unsigned doubtful = used & bitsOf(doubtfulEnds(innerLow, innerHigh, begin, end));
+                    if (doubtful != 0) {
+                        if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
+                        decideEnds(*exact, doubtful, t, r, begin, end);
+                    }
+                }
+                const auto keep = [&](V number, std::int32_t* list) {
+                    hn::Store(hn::DemoteTo(di, number), di, list + at);
+                };
+                for (std::size_t c = 0; c < channelCount; ++c) {
+                    const V value = hn::Add(hn::Add(hn::Load(d, channels[c].alongT),
+                                                    hn::Mul(hn::Set(d, channels[c].gradientR[lane]), r)),
+                                            hn::Mul(hn::Set(d, channels[c].gradientS[lane]), begin));
+                    hn::Store(value, d, channels[c].first + at);
+                }
+                if (HWY_LIKELY(part.isWithin)) {
+                    hn::Store(hn::Zero(di), di, rows.skipped + at);
+                } else {
+                    const V first = hn::Max(begin, hn::Set(d, part.from[0]));
+                    end = hn::Min(end, hn::Set(d, part.to[0]));
+                    keep(hn::Sub(first, begin), rows.skipped);
+                    begin = first;
+                }
+                keep(hn::Add(rowOffset, HWY_LIKELY(part.isAlongX) ? begin : hn::Mul(begin, strideS)),
+                     rows.offset);
+                keep(hn::Add(hn::Sub(end, begin), one), rows.length);
+                const unsigned hit = used & bitsOf(hn::Le(begin, end));
+                for (int q = 0; q < kLanes; q += 4) {
+                    const SetBits& set = kSetBits[(hit >> q) & 15];
+                    const std::uint64_t four =
+                        set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
+                    std::memcpy(rows.hit + hits, &four, sizeof four);
+                    hits += set.count;
+                }
+                r = hn::Add(r, one);
+                rowOffset = hn::Add(rowOffset, strideR);
+            }
+            rows.count += some * kLanes;
+            rows.hits = hits;
         }
     }
 }
 
-void walkElement(const ScanInput& input, const ScanOutput& output, Scratch& scratch, std::int32_t element,
-                 int lane, ScanCounts& counts) {
+void walkElement(Walk& walk, int lane) {
+    Scratch& scratch = walk.scratch;
     const Batch& batch = scratch.batch;
     const int axis = int(batch.axis[lane]);
     const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
-    // The part of the element's rows that lies in the region, relative to its first voxel.
-    double from[3], to[3];
-    for (int a = 0; a < 3; ++a) {
-        from[a] = output.region.min[axes[a]] - batch.base[axes[a]][lane];
-        to[a] = output.region.max[axes[a]] - 1 - batch.base[axes[a]][lane];
+    Part part;
+    part.origin = 0;
+    for (int i = 0; i < 3; ++i) {
+        const int a = axes[i];
+        const double base = batch.base[a][lane];
+        part.from[i] = walk.regionMin[a] - base;
+        part.to[i] = walk.regionLast[a] - base;
+        part.stride[i] = walk.stride[a];
+        part.origin += (base - walk.blockMin[a]) * part.stride[i];
     }
-    from[1] = std::max(from[1], batch.minT[lane]);
-    to[1] = std::min(to[1], batch.maxT[lane]);
-    from[2] = std::max(from[2], batch.minR[lane]);
-    to[2] = std::min(to[2], batch.maxR[lane]);
-    if (!(from[1] <= to[1] && from[2] <= to[2])) return;
-
-    int order[4], lower = 0, upper = 4;
-    for (int k = 0; k < 4; ++k) {
-        if (batch.lower[k][lane] != 0.0)
-            order[lower++] = k;
-        else
-            order[--upper] = k;
-    }
-    constexpr double kLimit = std::numeric_limits<float>::max();
-    for (BatchChannel& channel : scratch.channels)
-        channel.step = float(std::clamp(channel.gradientS[lane], -kLimit, kLimit));
-    Walk walk{input,
-              output,
-              scratch,
-              counts,
-              element,
-              lane,
-              output.stride[axes[0]],
-              output.stride[axes[1]],
-              output.stride[axes[2]],
-              0,
-              axis,
-              false,
-              {},
-              {}};
-    walk.simple = axis == 0 && scratch.channels.size() == 1 && scratch.channels[0].finite[lane] &&
-                  !scratch.channels[0].inDouble[lane];
-    for (int a = 0; a < 3; ++a) {
-        walk.origin += (std::int64_t(batch.base[a][lane]) - output.blockBox.min[a]) * output.stride[a];
-    }
-    switch (lower) {
+    part.from[1] = std::max(part.from[1], batch.minT[lane]);
+    part.to[1] = std::min(part.to[1], batch.maxT[lane]);
+    part.from[2] = std::max(part.from[2], batch.minR[lane]);
+    part.to[2] = std::min(part.to[2], batch.maxR[lane]);
+    if (!(part.from[1] <= part.to[1] && part.from[2] <= part.to[2])) return;
+    part.isWithin = batch.minS[lane] >= part.from[0] && batch.maxS[lane] <= part.to[0];
+    part.isAlongX = axis == 0;
+    scratch.stride[lane] = walk.output.stride[axis];
+    const BatchChannel* const channel = scratch.channels.data();
+    const bool isSimple =
+        axis == 0 && scratch.channels.size() == 1 && channel->finite[lane] && !channel->inDouble[lane];
+    scratch.longest[lane] = isSimple ? kShortRun : 0;
+    const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
+    switch (batch.grade[lane] == kDoubtful ? kCarefully : order.lower) {
         case 0:
-            walkRows<0>(walk, order, from, to);
+            solveRows<0>(walk, lane, part, order);
             break;
         case 1:
-            walkRows<1>(walk, order, from, to);
+            solveRows<1>(walk, lane, part, order);
             break;
         case 2:
-            walkRows<2>(walk, order, from, to);
+            solveRows<2>(walk, lane, part, order);
             break;
         case 3:
-            walkRows<3>(walk, order, from, to);
+            solveRows<3>(walk, lane, part, order);
+            break;
+        case 4:
+            solveRows<4>(walk, lane, part, order);
             break;
         default:
-            walkRows<4>(walk, order, from, to);
+            solveRows<kCarefully>(walk, lane, part, order);
             break;
     }
 }
@@ -639,19 +703,31 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
           ScanCounts& counts) {
     static thread_local Scratch scratch;
     scratch.channels.resize(input.channels.size());
+    Walk walk{input, output, scratch, counts, {}, {}, {}, {}, {}};
+    for (int a = 0; a < 3; ++a) {
+        walk.regionMin[a] = output.region.min[a];
+        walk.regionLast[a] = output.region.max[a] - 1;
+        walk.blockMin[a] = output.blockBox.min[a];
+        walk.stride[a] = double(output.stride[a]);
+    }
+    const bool isLarge = input.frame.nodes.size() * sizeof(NodeFrame::Node) > kCacheBytes;
     for (std::size_t begin = 0; begin < elements.size(); begin += kBatch) {
         const int count = int(std::min<std::size_t>(kBatch, elements.size() - begin));
         const std::int32_t* batchElements = elements.data() + begin;
-        prefetch(input, elements, begin + kBatch);
+        if (isLarge) prefetch(input, elements, begin + kBatch);
         loadBatch(input, batchElements, count, scratch.batch);
         for (std::size_t c = 0; c < input.channels.size(); ++c)
             loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);
+        std::copy_n(batchElements, count, scratch.element);
         for (int lane = 0; lane < count; ++lane) {
-            if (scratch.batch.grade[lane] != kThin)
-                walkElement(input, output, scratch, batchElements[lane], lane, counts);
-            else
+            if (scratch.batch.grade[lane] != kThin) {
+                walkElement(walk, lane);
+            } else {
+                writeRows(walk);
                 scanElementExactly(input, output, batchElements[lane], counts);
+            }
         }
+        writeRows(walk);
     }
 }
 

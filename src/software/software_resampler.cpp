@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -107,6 +108,12 @@ std::vector<ScanChannel> channelsOf(const TetMesh& mesh, std::span<const int> fi
     return channels;
 }
 
+ElementBins everyElement(const TetMesh& mesh) {
+    ElementBins bins{{0, mesh.elementCount()}, std::vector<std::int32_t>(mesh.tets.size())};
+    std::iota(bins.elements.begin(), bins.elements.end(), 0);
+    return bins;
+}
+
 class BoundSoftware : public BoundResampler {
   public:
     BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
@@ -132,7 +139,10 @@ class BoundSoftware : public BoundResampler {
         if (part) channels = channelsOf(*part, everyField(*part));
         const NodeFrame frame = frameNodes(mesh, lattice, execution);
         const ScanInput input{mesh, frame, channels};
-        const ElementBins bins = binElements(mesh, frame, regionBoxes, execution);
+        // A part of the mesh for one region alone needs no choice.
+        const ElementBins bins = part && regions.size() == 1
+                                     ? everyElement(mesh)
+                                     : binElements(mesh, frame, regionBoxes, execution);
         statistics.add(counted::elementsNear, mesh.elementCount());
         statistics.add(counted::elementBlockPairs, std::int64_t(bins.elements.size()));
         statistics.addMs(stage::bin, timer.restart());
@@ -239,7 +249,6 @@ class BoundSoftware : public BoundResampler {
         };
         forEachRow([&](std::int64_t offset, std::int64_t length) {
             std::fill_n(output.owner + offset, length, kNoOwner);
-            for (float* values : output.values) std::fill_n(values + offset, length, 0.0f);
         });
         target_.scan(input, output, elements, counts);
         std::int64_t covered = 0;
@@ -252,6 +261,10 @@ class BoundSoftware : public BoundResampler {
                 inRow += coverage[i];
             }
             covered += inRow;
+            if (inRow == length) return;
+            for (float* values : output.values)
+                for (std::int64_t i = 0; i < length; ++i)
+                    if (!coverage[i]) values[offset + i] = 0;
         });
         return covered;
     }
