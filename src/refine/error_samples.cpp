@@ -9,8 +9,6 @@
 #include "brick/leaf_tiles.h"
 #include "mesh/field_range.h"
 #include "mesh/geometry.h"
-#include "refine/used_nodes.h"
-
 namespace tessera {
 
 namespace {
@@ -47,7 +45,7 @@ SampledMesh::SampledMesh(const TetMesh& mesh, std::span<const int> fields, const
 }
 
 ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution)
-    : SampledMesh(mesh, fields, execution), volume_(mesh.tets.size()), usedNode_(mesh.points.size(), 0) {
+    : SampledMesh(mesh, fields, execution), volume_(mesh.tets.size()), nodes_(mesh.points.size()) {
     parallelForChunks(
         execution, mesh.elementCount(), kSampleChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t e = begin; e < end; ++e) {
@@ -58,7 +56,7 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
                 if (!(std::abs(sixfold.value) > sixfold.errorBound) && exactVolumeSign(a, b, c, d) == 0)
                     continue;
                 volume_[std::size_t(e)] = elementVolume(sixfold.value);
-                markNodes(tet, usedNode_);
+                nodes_.insert(tet);
             }
         });
 }

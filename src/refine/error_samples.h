@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "brick/seams.h"
+#include "refine/node_set.h"
 #include "tessera/mesh.h"
 
 namespace tessera {
@@ -77,14 +78,14 @@ class ErrorSamples : public SampledMesh {
     ErrorSamples(const TetMesh& mesh, std::span<const int> fields, const Execution& execution);
 
     bool exists(std::size_t sample) const {
-        return sample < nodeCount() ? usedNode_[sample] != 0 : volume_[sample - nodeCount()] > 0;
+        return sample < nodeCount() ? nodes_.contains(sample) : volume_[sample - nodeCount()] > 0;
     }
     /// |volume|, world units; 0 exactly when the element is flat.
     double volumeWorld(std::size_t element) const { return volume_[element]; }
 
   private:
     std::vector<double> volume_;
-    std::vector<std::uint8_t> usedNode_;
+    NodeSet nodes_;
 };
 
 /// The leaf that holds a place given in index space of level 0, or -1.

@@ -11,8 +11,8 @@
 
 #include "base/parallel.h"
 #include "base/text.h"
+#include "refine/node_set.h"
 #include "refine/refine_options.h"
-#include "refine/used_nodes.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -91,7 +91,7 @@ Extent extentOf(const TetMesh& mesh, const Execution& execution, const Counts& c
     parallelForChunks(execution, mesh.nodeCount(), kBoundsChunk, [&](std::int64_t begin, std::int64_t end) {
         Extent part;
         for (std::int64_t n = begin; n < end; ++n)
-            if (counts(n)) part.include(mesh.points[std::size_t(n)], std::int32_t(n));
+            if (counts(std::size_t(n))) part.include(mesh.points[std::size_t(n)], std::int32_t(n));
         parts[std::size_t(begin / kBoundsChunk)] = part;
     });
     Extent all;
@@ -124,10 +124,10 @@ bool elementsUse(const std::array<std::int32_t, 6>& nodes, const TetMesh& mesh, 
 Box3d meshBounds(const TetMesh& mesh, const Execution& execution, const ElementIndex* index) {
     if (index) return index->boundsWorld();
     // Nodes that no element uses don't count; there hardly ever are any.
-    const Extent all = extentOf(mesh, execution, [](std::int64_t) { return true; });
+    const Extent all = extentOf(mesh, execution, [](std::size_t) { return true; });
     if (elementsUse(all.node, mesh, execution)) return all.box;
-    const std::vector<std::uint8_t> used = usedNodes(mesh, execution);
-    return extentOf(mesh, execution, [&](std::int64_t n) { return used[std::size_t(n)] != 0; }).box;
+    const NodeSet used = usedNodes(mesh, execution);
+    return extentOf(mesh, execution, [&](std::size_t n) { return used.contains(n); }).box;
 }
 
 void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options) {

@@ -8,7 +8,7 @@
 #include "base/parallel.h"
 #include "brick/leaf_tiles.h"
 #include "mesh/geometry.h"
-#include "refine/used_nodes.h"
+#include "refine/node_set.h"
 
 namespace tessera {
 
@@ -90,8 +90,8 @@ class Measurement {
     std::optional<Box3d> bounds_;  // from the tree's origin
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
-    std::vector<std::uint8_t> usedNodes_;  // by elements with a volume
-    std::atomic<std::int64_t> done_{0};    // pieces of work, see advance
+    NodeSet samplesAtNodes_;             // nodes of elements with a volume
+    std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
 };
 
 Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, const BrickStore& store,
@@ -240,7 +240,7 @@ std::vector<Part> Measurement::measureNodes(const IsSample& isSample) {
         Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
         Batch batch(samples_.channels());
         for (std::int64_t n = begin; n < end; ++n) {
-            if (isSample(n)) {
+            if (isSample(std::size_t(n))) {
                 batch.sample[batch.count] = std::uint32_t(n);
                 batch.placeWorld[batch.count] = samples_.placeWorld(std::size_t(n), tree_.originWorld());
                 batch.volume[batch.count] = 0;
@@ -268,13 +268,11 @@ void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& ba
                                ? nullptr
                                : samples_.fields()[0].field->values.data();
     const int stride = values ? samples_.fields()[0].field->components : 0;
-    const float* nodeErrors = values ? lists_[0].data() : nullptr;
     batch.count = 0;
     for (std::int64_t e = begin; e < end; ++e) {
         for (const std::int32_t node : mesh_.tets[std::size_t(std::min(e + kPrefetch, last))]) {
             __builtin_prefetch(&mesh_.points[std::size_t(node)]);
             if (values) __builtin_prefetch(values + std::int64_t(node) * stride);
-            if (nodeErrors) __builtin_prefetch(nodeErrors + node);
         }
         const auto& tet = mesh_.tets[std::size_t(e)];
         const Vec3d &a = mesh_.points[std::size_t(tet[0])], &b = mesh_.points[std::size_t(tet[1])],
@@ -285,7 +283,6 @@ void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& ba
         part.flat += sign == 0;
         part.inverted += sign < 0;
         if (sign == 0) continue;
-        markNodes(tet, usedNodes_);
         const std::size_t sample = samples_.nodeCount() + std::size_t(e), i = batch.count++;
         batch.sample[i] = std::uint32_t(sample);
         batch.volume[i] = elementVolume(sixfold.value);
@@ -318,6 +315,8 @@ std::vector<Part> Measurement::measureElements() {
             for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
                 gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
                 measureBatch(batch, part);
+                for (std::size_t i = 0; i < batch.count; ++i)
+                    samplesAtNodes_.insert(mesh_.tets[batch.sample[i] - samples_.nodeCount()]);
                 for (std::size_t f = 0; f < lists_.size(); ++f) {
                     const SampledField& field = samples_.fields()[f];
                     for (std::size_t i = 0; i < batch.count; ++i) {
@@ -396,20 +395,16 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
 SampleErrors Measurement::run() {
     // Nearly always every node is a sample. Elements tell whether it is so; but a leaf's largest error can't
     // be taken back, so there it has to be known from the start.
-    if (leafErrors_) {
-        usedNodes_ = nodesOfVolumes(mesh_, execution_);
-    } else {
-        usedNodes_.assign(mesh_.points.size(), 0);
-    }
-    const auto isSample = [&](std::int64_t node) { return !leafErrors_ || usedNodes_[std::size_t(node)]; };
-    std::vector<Part> nodes = measureNodes(isSample);
+    samplesAtNodes_ = leafErrors_ ? nodesOfVolumes(mesh_, execution_) : NodeSet(mesh_.points.size());
+    std::vector<Part> nodes =
+        measureNodes([&](std::size_t node) { return !leafErrors_ || samplesAtNodes_.contains(node); });
     const std::vector<Part> elements = measureElements();
     SampleErrors result;
     result.sums = newPart().sums;
     addSums(elements, result);
-    if (!leafErrors_ && std::find(usedNodes_.begin(), usedNodes_.end(), 0) != usedNodes_.end()) {
+    if (!samplesAtNodes_.containsAll() && !leafErrors_) {
         for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
-        nodes = measureNodes([&](std::int64_t node) { return usedNodes_[std::size_t(node)] != 0; });
+        nodes = measureNodes([&](std::size_t node) { return samplesAtNodes_.contains(node); });
     }
     addSums(nodes, result);
     for (const Part& part : nodes) result.nodes += part.inside;
