@@ -54,29 +54,33 @@ float stepsPer(float size) {
     return std::isfinite(scale) ? scale : 0;
 }
 
-/// How a child's box and the one asked for lie.
-enum class Meeting { apart, across, inside };
-template <class Node, class Box>
-Meeting meetingOf(const Node& node, std::size_t c, const Box& box) {
-    bool meets = true, isInside = true;
-    for (std::size_t a = 0; a < 3; ++a) {
-        meets &= node.min[a][c] <= box.max[a] && node.max[a][c] >= box.min[a];
-        isInside &= node.min[a][c] >= box.min[a] && node.max[a][c] <= box.max[a];
+/// Which of a node's children meet a box, and which lie inside it; all are compared at once.
+template <std::size_t kWidth>
+struct Meetings {
+    std::array<std::int32_t, kWidth> meets, isInside;
+    template <class Node, class Box>
+    Meetings(const Node& node, const Box& box) {
+        meets.fill(1);
+        isInside.fill(1);
+        for (std::size_t a = 0; a < 3; ++a)
+            for (std::size_t c = 0; c < kWidth; ++c) {
+                meets[c] &= (node.min[a][c] <= box.max[a]) & (node.max[a][c] >= box.min[a]);
+                isInside[c] &= (node.min[a][c] >= box.min[a]) & (node.max[a][c] <= box.max[a]);
+            }
     }
-    return !meets ? Meeting::apart : isInside ? Meeting::inside : Meeting::across;
-}
+};
 
 /// One bit for each of the group's elements whose box meets the one asked for, that in the group's steps.
 template <class Group>
 unsigned metInGroup(const Group& group, const std::array<std::uint8_t, 6>& steps, std::size_t elements) {
-    unsigned met = 0;
-    for (std::size_t i = 0; i < elements; ++i) {
-        bool each = true;
-        for (std::size_t a = 0; a < 3; ++a)
-            each &= group.low[a][i] <= steps[3 + a] && group.high[a][i] >= steps[a];
-        met |= unsigned(each) << i;
-    }
-    return met;
+    std::array<std::uint8_t, 8> met;
+    met.fill(1);
+    for (std::size_t a = 0; a < 3; ++a)
+        for (std::size_t i = 0; i < met.size(); ++i)
+            met[i] &= std::uint8_t((group.low[a][i] <= steps[3 + a]) & (group.high[a][i] >= steps[a]));
+    std::uint64_t bytes = 0;  // of 0 or 1 each: the product brings them together in the last
+    std::memcpy(&bytes, met.data(), sizeof bytes);
+    return unsigned(bytes * 0x0102040810204080u >> 56) & ((1u << elements) - 1);
 }
 
 Box3d boxOf(const TetMesh& mesh, std::int64_t element) {
@@ -336,11 +340,11 @@ bool ElementIndex::clip(const Box3d& boxWorld, MappedBox& box) const {
 void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box, std::size_t most,
                          std::vector<std::int32_t>& elements) const {
     const Node& node = levels_[level][std::size_t(n)];
+    const Meetings<kWidth> meeting(node, box);
     for (std::size_t c = 0; c < kWidth && elements.size() <= most; ++c) {
-        const Meeting meeting = meetingOf(node, c, box);
-        if (meeting == Meeting::apart) continue;
+        if (!meeting.meets[c]) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
-        if (meeting == Meeting::inside) {
+        if (meeting.isInside[c]) {
             const std::span<const std::int32_t> all = elementsBelow(level, below);
             elements.insert(elements.end(), all.begin(), all.end());
         } else if (level > 0) {
@@ -357,11 +361,11 @@ void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box
 std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const MappedBox& box) const {
     const Node& node = levels_[level][std::size_t(n)];
     std::int64_t sum = 0;
+    const Meetings<kWidth> meeting(node, box);
     for (std::size_t c = 0; c < kWidth; ++c) {
-        const Meeting meeting = meetingOf(node, c, box);
-        if (meeting == Meeting::apart) continue;
+        if (!meeting.meets[c]) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
-        if (meeting == Meeting::inside)
+        if (meeting.isInside[c])
             sum += std::int64_t(elementsBelow(level, below).size());
         else if (level > 0)
             sum += count(level - 1, below, box);

@@ -1,7 +1,5 @@
 #include "refine/node_set.h"
 
-#include <bit>
-
 #include "base/parallel.h"
 #include "mesh/geometry.h"
 
@@ -23,12 +21,6 @@ NodeSet nodesOfElements(const TetMesh& mesh, const Execution& execution, const C
 }
 
 }  // namespace
-
-bool NodeSet::containsAll() const {
-    std::size_t count = 0;
-    for (const std::uint64_t word : words_) count += std::size_t(std::popcount(word));
-    return count == nodes_;
-}
 
 NodeSet usedNodes(const TetMesh& mesh, const Execution& execution) {
     return nodesOfElements(mesh, execution, [](const auto&) { return true; });

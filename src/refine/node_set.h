@@ -15,10 +15,9 @@ namespace tessera {
 class NodeSet {
   public:
     NodeSet() = default;
-    explicit NodeSet(std::size_t nodes) : words_((nodes + 63) / 64, 0), nodes_(nodes) {}
+    explicit NodeSet(std::size_t nodes) : words_((nodes + 63) / 64, 0) {}
 
     bool contains(std::size_t node) const { return words_[node / 64] >> node % 64 & 1; }
-    bool containsAll() const;
     /// Several threads may insert at once.
     void insert(const std::array<std::int32_t, 4>& tet) {
         for (const std::int32_t node : tet) {
@@ -29,9 +28,10 @@ class NodeSet {
         }
     }
 
+    friend bool operator==(const NodeSet&, const NodeSet&) = default;
+
   private:
     std::vector<std::uint64_t> words_;
-    std::size_t nodes_ = 0;
 };
 
 /// Those that some element uses, flat or not.

@@ -1,6 +1,5 @@
 #include "refine/sample_errors.h"
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -64,8 +63,7 @@ class Measurement {
     SampleErrors run();
 
   private:
-    template <class IsSample>
-    std::vector<Part> measureNodes(const IsSample& isSample);
+    std::vector<Part> measureNodes(const NodeSet& used);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
     void locate(Batch& batch) const;
@@ -90,7 +88,6 @@ class Measurement {
     std::optional<Box3d> bounds_;  // from the tree's origin
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
-    NodeSet samplesAtNodes_;             // nodes of elements with a volume
     std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
 };
 
@@ -233,16 +230,16 @@ void Measurement::measureBatch(Batch& batch, Part& part) {
     }
 }
 
-template <class IsSample>
-std::vector<Part> Measurement::measureNodes(const IsSample& isSample) {
+std::vector<Part> Measurement::measureNodes(const NodeSet& used) {
     std::vector<Part> parts(std::size_t((mesh_.nodeCount() + kErrorChunk - 1) / kErrorChunk));
     parallelForChunks(execution_, mesh_.nodeCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
         Batch batch(samples_.channels());
         for (std::int64_t n = begin; n < end; ++n) {
-            if (isSample(std::size_t(n))) {
-                batch.sample[batch.count] = std::uint32_t(n);
-                batch.placeWorld[batch.count] = samples_.placeWorld(std::size_t(n), tree_.originWorld());
+            const std::size_t node = std::size_t(n);
+            if (used.contains(node)) {
+                batch.sample[batch.count] = std::uint32_t(node);
+                batch.placeWorld[batch.count] = samples_.placeWorld(node, tree_.originWorld());
                 batch.volume[batch.count] = 0;
                 for (const SampledField& field : samples_.fields())
                     for (int c = 0; !field.isCell() && c < field.field->components; ++c)
@@ -315,8 +312,6 @@ std::vector<Part> Measurement::measureElements() {
             for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
                 gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
                 measureBatch(batch, part);
-                for (std::size_t i = 0; i < batch.count; ++i)
-                    samplesAtNodes_.insert(mesh_.tets[batch.sample[i] - samples_.nodeCount()]);
                 for (std::size_t f = 0; f < lists_.size(); ++f) {
                     const SampledField& field = samples_.fields()[f];
                     for (std::size_t i = 0; i < batch.count; ++i) {
@@ -393,18 +388,20 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
 }
 
 SampleErrors Measurement::run() {
-    // Nearly always every node is a sample. Elements tell whether it is so; but a leaf's largest error can't
-    // be taken back, so there it has to be known from the start.
-    samplesAtNodes_ = leafErrors_ ? nodesOfVolumes(mesh_, execution_) : NodeSet(mesh_.points.size());
-    std::vector<Part> nodes =
-        measureNodes([&](std::size_t node) { return !leafErrors_ || samplesAtNodes_.contains(node); });
+    // A leaf's largest error can't be taken back, so it needs to know the samples exactly from the start.
+    const NodeSet used = leafErrors_ ? nodesOfVolumes(mesh_, execution_) : usedNodes(mesh_, execution_);
+    std::vector<Part> nodes = measureNodes(used);
     const std::vector<Part> elements = measureElements();
     SampleErrors result;
     result.sums = newPart().sums;
     addSums(elements, result);
-    if (!samplesAtNodes_.containsAll() && !leafErrors_) {
-        for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
-        nodes = measureNodes([&](std::size_t node) { return samplesAtNodes_.contains(node); });
+    if (result.flatElements > 0) {
+        // Nodes of flat elements alone are no samples after all.
+        const NodeSet exact = nodesOfVolumes(mesh_, execution_);
+        if (exact != used) {
+            for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
+            nodes = measureNodes(exact);
+        }
     }
     addSums(nodes, result);
     for (const Part& part : nodes) result.nodes += part.inside;

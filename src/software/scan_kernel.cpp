@@ -90,9 +90,8 @@ struct alignas(64) BatchChannel {
     alignas(64) double alongT[kBatch];    // what t adds to the constant
 };
 
-/// Rows of the elements at work: where each one's run starts in the block, how long it is there, how many of
-/// its voxels lie before the region, and how far behind it a window of voxels has to start to end in the
-/// region.
+/// Rows of the elements at work: where each one's run starts in the block, how long it is there, and how many
+/// of its voxels lie before the region.
 struct alignas(64) Rows {
     std::int32_t offset[kMostRows], length[kMostRows], skipped[kMostRows];
     std::uint16_t hit[kMostRows + 4];  // the rows that have a run: row + kMostRows lane
@@ -133,7 +132,7 @@ struct Scratch {
     // Of the batch's elements:
     std::int32_t element[kBatch];
     std::int64_t stride[kBatch];  // along the scan axis
-    int longest[kBatch];          // runs up to this length are written by windows
+    int longest[kBatch];          // runs up to this length are written without a loop
 };
 
 }  // namespace tessera::scan_kernel
