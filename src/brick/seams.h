@@ -35,8 +35,7 @@ inline CellPlace locateInBrick(const Vec3d& local, int brickCells) {
     constexpr double kOnPlane = 1.0 / (1 << 30);
     CellPlace place;
     for (int a = 0; a < 3; ++a) {
-        const double inside = std::clamp(local[a], 0.0, double(brickCells - 1));
-        const int cell = floorToInt(inside);
+        const int cell = int(std::min(std::max(local[a], 0.0), double(brickCells - 1)));
         const double t = local[a] - cell;
         place.cell[a] = cell;
         place.fraction[a] = t < kOnPlane ? 0 : t > 1 - kOnPlane ? 1 : t;

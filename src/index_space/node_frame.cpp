@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "base/large_pages.h"
 #include "base/parallel.h"
 
 namespace tessera {
@@ -66,6 +67,8 @@ std::array<mpq_class, 3> exactIndexFromWorld(const Lattice& lattice, const Vec3d
 NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution) {
     NodeFrame frame;
     frame.lattice = lattice;
+    reserveLarge(frame.nodes, mesh.points.size());
+    reserveLarge(frame.rough, mesh.points.size());
     frame.nodes.resize(mesh.points.size());
     frame.rough.resize(mesh.points.size());
     const bool axisParallel = lattice.isAxisParallel();

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/large_pages.h"
 #include "base/parallel.h"
 #include "mesh/geometry.h"
 
@@ -412,7 +413,7 @@ SplitCells splitCells(const std::vector<Vec3d>& points, const CellList& cells, c
     SplitCells all;
     std::size_t tetCount = 0;
     for (const SplitCells& part : parts) tetCount += part.tets.size();
-    all.tets.reserve(tetCount);
+    reserveLarge(all.tets, tetCount);
     all.sourceCell.reserve(tetCount);
     for (SplitCells& part : parts) append(all, part, points.size());
     return all;

@@ -7,6 +7,7 @@
 #include <string>
 #include <type_traits>
 
+#include "base/large_pages.h"
 #include "base/parallel.h"
 
 namespace tessera {
@@ -147,7 +148,10 @@ std::vector<Item> readArray(std::span<const std::byte>& rest, std::int64_t count
         throw DamagedPacket(std::string("it ends inside its ") + what);
     const auto* first = reinterpret_cast<const Item*>(rest.data());
     rest = rest.subspan(std::size_t(count) * sizeof(Item));
-    return {first, first + count};
+    std::vector<Item> items;
+    reserveLarge(items, std::size_t(count));
+    items.assign(first, first + count);
+    return items;
 }
 
 template <class IsSound>

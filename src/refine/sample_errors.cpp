@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "base/large_pages.h"
 #include "base/parallel.h"
 #include "brick/leaf_tiles.h"
 #include "mesh/geometry.h"
@@ -102,7 +103,11 @@ Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, cons
       execution_(execution),
       leafErrors_(leafErrors),
       tiles_(tree, store, execution),
-      lists_(samples.fields().size(), std::vector<float>(samples.count(), -1.0f)) {
+      lists_(samples.fields().size()) {
+    for (std::vector<float>& list : lists_) {
+        reserveLarge(list, samples.count());
+        list.assign(samples.count(), -1.0f);
+    }
     if (boundsWorld)
         bounds_ = Box3d{boundsWorld->min - tree.originWorld(), boundsWorld->max - tree.originWorld()};
 }
