@@ -127,7 +127,7 @@ constexpr auto kFaceOrder = [] {
 
 struct Scratch {
     Batch batch;
-    std::vector<BatchChannel> channels;
+    std::vector<BatchChannel> channels;  // one at least, which nothing is read of where there is none
     Rows rows;
     // Of the batch's elements:
     std::int32_t element[kBatch];
@@ -385,7 +385,7 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
             if (!contestPoint(walk.input, walk.output, element, rankOf(walk, lane, offset), offset)) continue;
         }
         const double number = double(rows.skipped[row]) + k;
-        for (std::size_t c = 0; c < scratch.channels.size(); ++c)
+        for (std::size_t c = 0; c < walk.input.channels.size(); ++c)
             walk.output.values[c][offset] = valueAt(scratch.channels[c], lane, row, number);
     }
 }
@@ -402,9 +402,7 @@ HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped
                    first = hn::Set(df, value);
         for (; k + lanes <= length; k += lanes) {
             auto v = hn::Add(first, hn::Mul(hn::Iota(df, float(skipped + k)), slope));
-            v = hn::IfThenElse(hn::Lt(v, lowest), lowest, v);
-            v = hn::IfThenElse(hn::Gt(v, highest), highest, v);
-            hn::StoreU(v, df, out + k);
+            hn::StoreU(hn::Min(highest, hn::Max(lowest, v)), df, out + k);
         }
     }
     for (; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
@@ -422,7 +420,7 @@ HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
         return;
     }
     for (int k = 0; k < length; ++k) owner[k * stride] = scratch.element[lane];
-    for (std::size_t c = 0; c < scratch.channels.size(); ++c) {
+    for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
         if (channel.finite[lane] && !channel.inDouble[lane]) {
@@ -442,6 +440,7 @@ void writeRows(Walk& walk) {
     Rows& rows = scratch.rows;
     std::int32_t* const owners = walk.output.owner;
     const int hits = rows.hits;
+    const BatchChannel& channel = scratch.channels[0];
     float* const values = walk.output.values.empty() ? nullptr : walk.output.values[0];
     for (int i = 0; i < hits; ++i) {
         const int row = rows.hit[i] % kMostRows, lane = rows.hit[i] / kMostRows;
@@ -450,7 +449,6 @@ void writeRows(Walk& walk) {
             writeRun(walk, lane, row);
             continue;
         }
-        const BatchChannel& channel = scratch.channels[0];
         std::int32_t* const owner = owners + rows.offset[row];
         float* const out = values + rows.offset[row];
         const std::int32_t element = scratch.element[lane];
@@ -461,8 +459,7 @@ void writeRows(Walk& walk) {
         const hn::RebindToSigned<decltype(df)> di;
         const auto valuesAt = [&](auto number) {
             const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
-            const auto raised = hn::IfThenElse(hn::Lt(v, hn::Set(df, low)), hn::Set(df, low), v);
-            return hn::IfThenElse(hn::Gt(raised, hn::Set(df, high)), hn::Set(df, high), raised);
+            return hn::Min(hn::Set(df, high), hn::Max(hn::Set(df, low), v));
         };
         if (length >= 4) {
             const int last = length - 4;
@@ -551,12 +548,14 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
     const Batch& batch = scratch.batch;
     Rows& rows = scratch.rows;
     BatchChannel* const channels = scratch.channels.data();
-    const std::size_t channelCount = scratch.channels.size();
+    const std::size_t channelCount = walk.input.channels.size();
     const int lower = Lower == kCarefully ? order.lower : Lower;
     const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]),
             strideS = hn::Set(d, part.stride[0]), strideR = hn::Set(d, part.stride[2]), one = hn::Set(d, 1.0);
     V planeC[4];
     for (int i = 0; i < 4; ++i) planeC[i] = hn::Set(d, batch.planeC[order.face[i]][lane]);
+    const V gradientR0 = hn::Set(d, channels[0].gradientR[lane]),
+            gradientS0 = hn::Set(d, channels[0].gradientS[lane]);
     std::optional<ExactScanlines> exact;
     const int countT = int(part.to[1] - part.from[1]) + 1, countR = int(part.to[2] - part.from[2]) + 1;
     walk.counts.scanlines += std::int64_t(countT) * countR;
@@ -571,10 +570,13 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
             if (Lower == kCarefully)
                 inner[i] = hn::Add(hn::Set(d, batch.planeA[face][lane] + batch.shrink[face][lane]), plane);
         }
-        for (std::size_t c = 0; c < channelCount; ++c)
-            hn::Store(hn::Add(hn::Set(d, channels[c].constant[lane]),
-                              hn::Mul(hn::Set(d, channels[c].gradientT[lane]), t)),
-                      d, channels[c].alongT);
+        const auto valueAlongT = [&](const BatchChannel& channel) {
+            return hn::Add(hn::Set(d, channel.constant[lane]),
+                           hn::Mul(hn::Set(d, channel.gradientT[lane]), t));
+        };
+        const V value0 = valueAlongT(channels[0]);
+        for (std::size_t c = 1; c < channelCount; ++c)
+            hn::Store(valueAlongT(channels[c]), d, channels[c].alongT);
         V r = hn::Set(d, part.from[2]);
         V rowOffset = hn::Add(hn::Set(d, part.origin),  // of s = 0
                               hn::Add(hn::Mul(t, hn::Set(d, part.stride[1])), hn::Mul(r, strideR)));
@@ -599,12 +601,15 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
                 const auto keep = [&](V number, std::int32_t* list) {
                     hn::Store(hn::DemoteTo(di, number), di, list + at);
                 };
-                for (std::size_t c = 0; c < channelCount; ++c) {
-                    const V value = hn::Add(hn::Add(hn::Load(d, channels[c].alongT),
-                                                    hn::Mul(hn::Set(d, channels[c].gradientR[lane]), r)),
-                                            hn::Mul(hn::Set(d, channels[c].gradientS[lane]), begin));
-                    hn::Store(value, d, channels[c].first + at);
-                }
+                const auto valueOf = [&](V ofT, V gradientR, V gradientS) {
+                    return hn::Add(hn::Add(ofT, hn::Mul(gradientR, r)), hn::Mul(gradientS, begin));
+                };
+                hn::Store(valueOf(value0, gradientR0, gradientS0), d, channels[0].first + at);
+                for (std::size_t c = 1; c < channelCount; ++c)
+                    hn::Store(
+                        valueOf(hn::Load(d, channels[c].alongT), hn::Set(d, channels[c].gradientR[lane]),
+                                hn::Set(d, channels[c].gradientS[lane])),
+                        d, channels[c].first + at);
                 if (HWY_LIKELY(part.isWithin)) {
                     hn::Store(hn::Zero(di), di, rows.skipped + at);
                 } else {
@@ -656,9 +661,9 @@ void walkElement(Walk& walk, int lane) {
     part.isWithin = batch.minS[lane] >= part.from[0] && batch.maxS[lane] <= part.to[0];
     part.isAlongX = axis == 0;
     scratch.stride[lane] = walk.output.stride[axis];
-    const BatchChannel* const channel = scratch.channels.data();
+    const BatchChannel& channel = scratch.channels[0];
     const bool isSimple =
-        axis == 0 && scratch.channels.size() == 1 && channel->finite[lane] && !channel->inDouble[lane];
+        axis == 0 && walk.input.channels.size() == 1 && channel.finite[lane] && !channel.inDouble[lane];
     scratch.longest[lane] = isSimple ? kShortRun : 0;
     const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
     switch (batch.grade[lane] == kDoubtful ? kCarefully : order.lower) {
@@ -701,7 +706,7 @@ void prefetch(const ScanInput& input, std::span<const std::int32_t> elements, st
 void scan(const ScanInput& input, const ScanOutput& output, std::span<const std::int32_t> elements,
           ScanCounts& counts) {
     static thread_local Scratch scratch;
-    scratch.channels.resize(input.channels.size());
+    scratch.channels.resize(std::max<std::size_t>(1, input.channels.size()));
     Walk walk{input, output, scratch, counts, {}, {}, {}, {}, {}};
     for (int a = 0; a < 3; ++a) {
         walk.regionMin[a] = output.region.min[a];
