@@ -168,13 +168,9 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
     const std::int64_t elements = mesh.elementCount();
     const std::int64_t chunk = std::max<std::int64_t>(4096, elements / (8 * execution.threadCount()) + 1);
     const std::size_t chunks = std::size_t((elements + chunk - 1) / chunk);
-    std::vector<std::vector<Pair>> pairs(chunks);
-    std::vector<std::vector<std::int32_t>> counts(chunks);
-    parallelForChunks(execution, elements, chunk, [&](std::int64_t begin, std::int64_t end) {
-        std::vector<Pair>& found = pairs[std::size_t(begin / chunk)];
-        std::vector<std::int32_t>& count = counts[std::size_t(begin / chunk)];
-        count.assign(regions.size(), 0);
-        found.reserve(std::size_t(end - begin));
+    // Calls found(element, low, high) for the chunk's elements that share lattice points low..high with the
+    // regions.
+    const auto forEachNear = [&](std::int64_t begin, std::int64_t end, const auto& found) {
         for (std::int64_t e = begin; e < end; ++e) {
             if (e + kAhead < end)  // elements come in no order that caches could guess
                 for (const std::int32_t node : mesh.tets[std::size_t(e + kAhead)])
@@ -183,17 +179,34 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
             if (!latticeBounds(frame, mesh.tets[std::size_t(e)], marginVoxels, bounds)) continue;
             const Vec3i low = glm::max(Vec3i{bounds.low[0], bounds.low[1], bounds.low[2]}, all.min);
             const Vec3i high = glm::min(Vec3i{bounds.high[0], bounds.high[1], bounds.high[2]}, all.max - 1);
-            if (low.x > high.x || low.y > high.y || low.z > high.z) continue;
-            if (regions.size() == 1) {
-                found.push_back({0, std::int32_t(e)});
-                continue;
-            }
+            if (low.x <= high.x && low.y <= high.y && low.z <= high.z) found(std::int32_t(e), low, high);
+        }
+    };
+    if (regions.size() == 1) {
+        std::vector<std::vector<std::int32_t>> lists(chunks);
+        parallelForChunks(execution, elements, chunk, [&](std::int64_t begin, std::int64_t end) {
+            std::vector<std::int32_t>& list = lists[std::size_t(begin / chunk)];
+            list.reserve(std::size_t(end - begin));
+            forEachNear(begin, end, [&](std::int32_t e, const Vec3i&, const Vec3i&) { list.push_back(e); });
+        });
+        for (const std::vector<std::int32_t>& list : lists)
+            bins.elements.insert(bins.elements.end(), list.begin(), list.end());
+        bins.first[1] = std::int64_t(bins.elements.size());
+        return bins;
+    }
+    std::vector<std::vector<Pair>> pairs(chunks);
+    std::vector<std::vector<std::int32_t>> counts(chunks);
+    parallelForChunks(execution, elements, chunk, [&](std::int64_t begin, std::int64_t end) {
+        std::vector<Pair>& found = pairs[std::size_t(begin / chunk)];
+        std::vector<std::int32_t>& count = counts[std::size_t(begin / chunk)];
+        count.assign(regions.size(), 0);
+        found.reserve(std::size_t(end - begin));
+        forEachNear(begin, end, [&](std::int32_t e, const Vec3i& low, const Vec3i& high) {
             grid.forEachRegion(low, high, [&](std::int32_t region) {
-                found.push_back({region, std::int32_t(e)});
+                found.push_back({region, e});
                 ++count[std::size_t(region)];
             });
-        }
-        if (regions.size() == 1) count[0] = std::int32_t(found.size());
+        });
     });
     for (std::size_t r = 0; r < regions.size(); ++r) {
         std::int64_t next = bins.first[r];

@@ -78,6 +78,7 @@ unsigned metInGroup(const Group& group, const std::array<std::uint8_t, 6>& steps
     for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t i = 0; i < met.size(); ++i)
             met[i] &= std::uint8_t((group.low[a][i] <= steps[3 + a]) & (group.high[a][i] >= steps[a]));
+    static_assert(std::endian::native == std::endian::little);
     std::uint64_t bytes = 0;  // of 0 or 1 each: the product brings them together in the last
     std::memcpy(&bytes, met.data(), sizeof bytes);
     return unsigned(bytes * 0x0102040810204080u >> 56) & ((1u << elements) - 1);

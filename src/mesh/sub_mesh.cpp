@@ -123,13 +123,14 @@ TetMesh extractElements(const TetMesh& mesh, std::span<const std::int32_t> eleme
     TetMesh part;
     part.tets.resize(elements.size());
     std::int32_t last = -1;
-    for (std::size_t i = 0; i < elements.size(); ++i) {
-        const std::int32_t e = elements[i];
+    for (const std::int32_t e : elements) {
         TESSERA_CHECK(e > last && e < mesh.elementCount(), "elements of a part ascend and are in the mesh");
         last = e;
+    }
+    for (std::size_t i = 0; i < elements.size(); ++i) {
         if (i + kElementsAhead < elements.size())
             __builtin_prefetch(mesh.tets.data() + elements[i + kElementsAhead]);
-        part.tets[i] = mesh.tets[std::size_t(e)];
+        part.tets[i] = mesh.tets[std::size_t(elements[i])];
     }
     const NodeNumbers numbers(part.tets);
     const std::vector<std::int32_t>& nodes = numbers.nodes();

@@ -9,6 +9,7 @@
 #include "brick/leaf_tiles.h"
 #include "mesh/field_range.h"
 #include "mesh/geometry.h"
+
 namespace tessera {
 
 namespace {

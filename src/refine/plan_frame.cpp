@@ -22,6 +22,7 @@ namespace {
 constexpr double kMaxIndex = 1 << 29;  // of level 0; resamplers take indices up to 2^30
 constexpr int kDefaultUniformResolution = 256;
 constexpr int kDefaultLevels = 8;
+constexpr std::int64_t kBoundsChunk = 16384;
 
 bool finite(const Vec3d& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -48,12 +49,6 @@ double finestSpacing(const RefineOptions& options, double longest) {
     const int points = options.resolution > 0 ? options.resolution : kDefaultUniformResolution;
     return longest / (points - 1);
 }
-
-}  // namespace
-
-namespace {
-
-constexpr std::int64_t kBoundsChunk = 16384;
 
 /// A box of nodes, and for each of its six sides a node on it.
 struct Extent {

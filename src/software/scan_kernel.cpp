@@ -1,4 +1,5 @@
-// The scanline walk of Weiler and Ertl 2001, section 4, for eight elements and eight scanlines at a time.
+// The scanline walk of Weiler and Ertl 2001, section 4, for eight elements and a vector of scanlines at a
+// time.
 //
 // Each face of an element is solved for the scan axis, s >= A + B t + C r or s <= A + B t + C r, so a
 // scanline's ends are a maximum and a minimum of at most three such planes. Planes are moved outwards by a
@@ -8,10 +9,14 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "software/scan_kernel.h"
 
@@ -33,8 +38,6 @@ namespace tessera::scan_kernel {
 inline constexpr int kBatch = 8;
 /// So many rows of elements are solved before their runs are written.
 inline constexpr int kMostRows = 256;
-/// Runs of up to so many voxels along x are written without a loop.
-inline constexpr int kShortRun = 8;
 inline constexpr double kUnit = 0x1p-53;
 /// Nodes of a mesh that take less than this are near at hand without being fetched ahead.
 inline constexpr std::size_t kCacheBytes = std::size_t(1) << 19;
@@ -98,6 +101,7 @@ struct alignas(64) Rows {
     int count = 0, hits = 0;
 };
 
+static_assert(std::endian::native == std::endian::little, "places are stored by the word");
 /// The places of the set bits of four, 16 bits each from the lowest on, and their count.
 struct SetBits {
     std::uint64_t places;
@@ -145,6 +149,10 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kBatch>;
 using V = hn::VFromD<D>;
 using M = decltype(hn::Eq(V(), V()));
+/// Runs of up to so many voxels along x are written without a loop, by two vectors that may overlap; 0 where
+/// there are no vectors.
+using Four = hn::CappedTag<float, 4>;
+constexpr int kShortRun = hn::MaxLanes(Four()) == 4 ? 8 : 0;
 
 HWY_INLINE V abs3(V a, V b, V c) {
     return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c));
@@ -433,8 +441,8 @@ HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
     }
 }
 
-// Writes the runs of the rows at work. Most are short, and of no length that can be foreseen: those of
-// elements that allow it are written without a branch, with the voxels beside them as they were.
+// Writes the runs of the rows at work. Most are short, and of no length that can be foreseen: few branches
+// depend on it.
 void writeRows(Walk& walk) {
     Scratch& scratch = walk.scratch;
     Rows& rows = scratch.rows;
@@ -455,7 +463,7 @@ void writeRows(Walk& walk) {
         const auto value = float(channel.first[row]);
         const auto skipped = float(rows.skipped[row]);
         const float step = channel.step[lane], low = channel.low[lane], high = channel.high[lane];
-        const hn::CappedTag<float, 4> df;
+        const Four df;
         const hn::RebindToSigned<decltype(df)> di;
         const auto valuesAt = [&](auto number) {
             const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
@@ -532,7 +540,7 @@ HWY_NOINLINE void decideEnds(const ExactScanlines& exact, unsigned doubtful, V t
 // The part of an element that lies in the region, relative to its first voxel: s, t and r.
 struct Part {
     double from[3], to[3];
-    double origin, stride[3];  // offset of the first voxel in the block (may lie outside); s, t and r
+    double origin, stride[3];  // offset of the part's first voxel in the block; of s, t and r
     bool isWithin;             // no run is cut
     bool isAlongX;
 };
@@ -551,7 +559,8 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
     const std::size_t channelCount = walk.input.channels.size();
     const int lower = Lower == kCarefully ? order.lower : Lower;
     const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]),
-            strideS = hn::Set(d, part.stride[0]), strideR = hn::Set(d, part.stride[2]), one = hn::Set(d, 1.0);
+            fromS = hn::Set(d, part.from[0]), strideS = hn::Set(d, part.stride[0]),
+            strideR = hn::Set(d, part.stride[2]), one = hn::Set(d, 1.0);
     V planeC[4];
     for (int i = 0; i < 4; ++i) planeC[i] = hn::Set(d, batch.planeC[order.face[i]][lane]);
     const V gradientR0 = hn::Set(d, channels[0].gradientR[lane]),
@@ -577,9 +586,11 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
         const V value0 = valueAlongT(channels[0]);
         for (std::size_t c = 1; c < channelCount; ++c)
             hn::Store(valueAlongT(channels[c]), d, channels[c].alongT);
+        // Of the part's first voxel there. Offsets in the block are whole numbers in double, but that of the
+        // element's own first voxel might not be.
+        V rowOffset =
+            hn::Add(hn::Set(d, part.origin), hn::Mul(hn::Iota(d, double(done)), hn::Set(d, part.stride[1])));
         V r = hn::Set(d, part.from[2]);
-        V rowOffset = hn::Add(hn::Set(d, part.origin),  // of s = 0
-                              hn::Add(hn::Mul(t, hn::Set(d, part.stride[1])), hn::Mul(r, strideR)));
         for (int left = countR; left > 0;) {
             if (rows.count == kMostRows) writeRows(walk);
             const int some = std::min(left, (kMostRows - rows.count) / kLanes);
@@ -613,12 +624,13 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
                 if (HWY_LIKELY(part.isWithin)) {
                     hn::Store(hn::Zero(di), di, rows.skipped + at);
                 } else {
-                    const V first = hn::Max(begin, hn::Set(d, part.from[0]));
+                    const V first = hn::Max(begin, fromS);
                     end = hn::Min(end, hn::Set(d, part.to[0]));
                     keep(hn::Sub(first, begin), rows.skipped);
                     begin = first;
                 }
-                keep(hn::Add(rowOffset, HWY_LIKELY(part.isAlongX) ? begin : hn::Mul(begin, strideS)),
+                const V inPart = hn::Sub(begin, fromS);
+                keep(hn::Add(rowOffset, HWY_LIKELY(part.isAlongX) ? inPart : hn::Mul(inPart, strideS)),
                      rows.offset);
                 keep(hn::Add(hn::Sub(end, begin), one), rows.length);
                 const unsigned hit = used & bitsOf(hn::Le(begin, end));
@@ -644,20 +656,21 @@ void walkElement(Walk& walk, int lane) {
     const int axis = int(batch.axis[lane]);
     const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
     Part part;
-    part.origin = 0;
     for (int i = 0; i < 3; ++i) {
         const int a = axes[i];
         const double base = batch.base[a][lane];
         part.from[i] = walk.regionMin[a] - base;
         part.to[i] = walk.regionLast[a] - base;
         part.stride[i] = walk.stride[a];
-        part.origin += (base - walk.blockMin[a]) * part.stride[i];
     }
     part.from[1] = std::max(part.from[1], batch.minT[lane]);
     part.to[1] = std::min(part.to[1], batch.maxT[lane]);
     part.from[2] = std::max(part.from[2], batch.minR[lane]);
     part.to[2] = std::min(part.to[2], batch.maxR[lane]);
     if (!(part.from[1] <= part.to[1] && part.from[2] <= part.to[2])) return;
+    part.origin = 0;
+    for (int i = 0; i < 3; ++i)
+        part.origin += (part.from[i] + (batch.base[axes[i]][lane] - walk.blockMin[axes[i]])) * part.stride[i];
     part.isWithin = batch.minS[lane] >= part.from[0] && batch.maxS[lane] <= part.to[0];
     part.isAlongX = axis == 0;
     scratch.stride[lane] = walk.output.stride[axis];
@@ -707,6 +720,7 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
           ScanCounts& counts) {
     static thread_local Scratch scratch;
     scratch.channels.resize(std::max<std::size_t>(1, input.channels.size()));
+    scratch.rows.count = scratch.rows.hits = 0;  // an exception may have left some
     Walk walk{input, output, scratch, counts, {}, {}, {}, {}, {}};
     for (int a = 0; a < 3; ++a) {
         walk.regionMin[a] = output.region.min[a];

@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "index_space/element_bins.h"
 #include "index_space/element_depth.h"
@@ -161,6 +165,78 @@ TEST(SoftwareResampler, ATargetThatIsAskedForRuns) {
         EXPECT_EQ(software.bind(mesh, {}, {.target = target})->target(), target);
     EXPECT_EQ(software.bind(mesh, {}, {})->target(), software.targets().front());
     EXPECT_THROW(software.bind(mesh, {}, {.target = "no such"}), InputError);
+}
+
+// Elements of one to twenty voxels in all directions, overlapping: runs of all lengths, contested points, all
+// scan axes.
+TetMesh manyElements(int count) {
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> place(-4, 36), size(-10, 10), value(-1, 1);
+    std::uniform_int_distribution<int> thin(0, 5);
+    TetMesh mesh;
+    for (const char* name : {"f", "g"}) mesh.fields.push_back({name, FieldLocation::point, 1, {}});
+    for (int e = 0; e < count; ++e) {
+        const Vec3d middle(place(random), place(random), place(random));
+        Vec3d reach(1);
+        const int axis = thin(random);
+        if (axis < 3) reach = Vec3d(0.15), reach[axis] = 1;
+        for (int k = 0; k < 4; ++k) {
+            mesh.points.push_back(middle + reach * Vec3d(size(random), size(random), size(random)));
+            for (Field& field : mesh.fields) field.values.push_back(value(random));
+        }
+        mesh.tets.push_back({4 * e, 4 * e + 1, 4 * e + 2, 4 * e + 3});
+    }
+    return mesh;
+}
+
+struct Sampled {
+    std::vector<float> values;
+    std::vector<std::uint8_t> coverage;
+    bool operator==(const Sampled&) const = default;
+};
+
+Sampled sampled(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
+                const IndexBox& box, int threads) {
+    Execution execution;
+    execution.threads = threads;
+    Sampled result;
+    SoftwareResampler()
+        .bind(mesh, fields, options)
+        ->resample(
+            Lattice::axisParallel({0, 0, 0}, 1), {&box, 1},
+            [&](std::size_t, const Block& block) {
+                result.values.assign(block.values.begin(), block.values.end());
+                result.coverage.assign(block.coverage.begin(), block.coverage.end());
+            },
+            execution);
+    return result;
+}
+
+TEST(SoftwareResampler, EveryTargetAndCutIntoRegionsGivesTheSameBits) {
+    const TetMesh mesh = manyElements(1200);
+    const IndexBox box{{0, 0, 0}, {70, 33, 20}};
+    for (const std::vector<int>& fields : {std::vector<int>{}, std::vector<int>{1}, std::vector<int>{0, 1}}) {
+        const Sampled first = sampled(mesh, fields, {}, box, 1);
+        ASSERT_GT(std::count(first.coverage.begin(), first.coverage.end(), 1), 10000);
+        for (const std::string& target : SoftwareResampler().targets())
+            for (const Route route : {Route::pass, Route::index})
+                for (const int threads : {1, 4})
+                    EXPECT_EQ(sampled(mesh, fields, {.target = target, .route = route}, box, threads), first)
+                        << target << ", " << fields.size() << " fields, " << threads << " threads";
+    }
+}
+
+TEST(SoftwareResampler, ElementsWithoutAPlaceCoverNothing) {
+    for (const double nowhere : {double(NAN), double(INFINITY)}) {
+        TetMesh mesh;
+        mesh.points = {{4, 4, 4.2}, {6, 4, 4.4}, {4, 6, 4.6}, {5, nowhere, 4.8}};
+        mesh.tets = {{0, 1, 2, 3}};
+        for (const Route route : {Route::pass, Route::index}) {
+            const Sampled result =
+                sampled(mesh, {}, {.target = {}, .route = route}, {{3, 3, 3}, {8, 8, 8}}, 1);
+            EXPECT_EQ(std::count(result.coverage.begin(), result.coverage.end(), 1), 0);
+        }
+    }
 }
 
 TEST(Registry, FindsByNameAndListsTheNamesOtherwise) {
