@@ -17,6 +17,8 @@ constexpr std::int64_t kIndexChunk = 1 << 13;
 constexpr std::size_t kSortParts = 8;
 /// Fewer numbers are sorted by comparison.
 constexpr std::size_t kRadixFrom = 512;
+/// Numbers that lie so close together, in words of 64 bits, are sorted as bits.
+constexpr std::size_t kWordsPerNumber = 2;
 constexpr int kMortonBits = 21;
 /// A place is mapped back with an error of at most this share of the bounds and their distance from the
 /// origin.
@@ -125,20 +127,42 @@ void sortKeys(std::vector<Keyed>& keys, const Execution& execution) {
 
 }  // namespace
 
-void sortAscending(std::vector<std::int32_t>& numbers, std::size_t from) {
+void sortEachOnce(std::vector<std::int32_t>& numbers, std::size_t from) {
     const std::size_t count = numbers.size() - from;
     std::int32_t* first = numbers.data() + from;
+    const auto dropRepeated = [&] {
+        numbers.erase(std::unique(numbers.begin() + std::ptrdiff_t(from), numbers.end()), numbers.end());
+    };
     if (count < kRadixFrom) {
         std::sort(first, first + count);
+        return dropRepeated();
+    }
+    std::int32_t least = first[0], most = first[0];
+    for (std::size_t i = 1; i < count; ++i) {
+        least = std::min(least, first[i]);
+        most = std::max(most, first[i]);
+    }
+    const std::size_t range = std::size_t(most - least) / 64 + 1;
+    if (range <= kWordsPerNumber * count) {
+        static thread_local std::vector<std::uint64_t> bits;
+        bits.assign(range, 0);
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto bit = std::uint32_t(first[i] - least);
+            bits[bit / 64] |= std::uint64_t(1) << bit % 64;
+        }
+        std::int32_t* next = first;
+        for (std::size_t w = 0; w < range; ++w)
+            for (std::uint64_t word = bits[w]; word != 0; word &= word - 1)
+                *next++ = least + std::int32_t(64 * w) + std::countr_zero(word);
+        numbers.resize(std::size_t(next - numbers.data()));
         return;
     }
     constexpr int kBits = 11;
     constexpr std::size_t kBins = std::size_t(1) << kBits;
     static thread_local std::vector<std::int32_t> other;
     other.resize(count);
-    const std::int32_t largest = *std::max_element(first, first + count);
     std::int32_t *source = first, *target = other.data();
-    for (int shift = 0; shift < 31 && (largest >> shift) != 0; shift += kBits) {
+    for (int shift = 0; shift < 31 && (most >> shift) != 0; shift += kBits) {
         std::array<std::uint32_t, kBins> next{};
         for (std::size_t i = 0; i < count; ++i) ++next[std::size_t(source[i] >> shift) & (kBins - 1)];
         std::uint32_t sum = 0;
@@ -152,6 +176,7 @@ void sortAscending(std::vector<std::int32_t>& numbers, std::size_t from) {
         std::swap(source, target);
     }
     if (source != first) std::memcpy(first, source, count * sizeof *first);
+    dropRepeated();
 }
 
 /// The boxes of one level of nodes, and of the groups below all.
@@ -382,7 +407,7 @@ void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& eleme
     if (!clip(boxWorld, box)) return;
     const std::size_t first = elements.size();
     query(levels_.size() - 1, 0, box, most, elements);
-    if (elements.size() <= most) sortAscending(elements, first);
+    if (elements.size() <= most) sortEachOnce(elements, first);
 }
 
 std::int64_t ElementIndex::count(const Box3d& boxWorld) const {

@@ -110,8 +110,9 @@ class ElementIndex {
     std::vector<std::vector<Node>> levels_;  ///< children of level 0 are groups; the last level has one node
 };
 
-/// Puts numbers that aren't negative into ascending order, in time in proportion to their count.
-void sortAscending(std::vector<std::int32_t>& numbers, std::size_t from = 0);
+/// Puts numbers that aren't negative, from place `from` on, into ascending order, each once, in time in
+/// proportion to their count.
+void sortEachOnce(std::vector<std::int32_t>& numbers, std::size_t from = 0);
 
 /// The index of one mesh, built by the first who needs it; all share it. The mesh must outlive it and stay
 /// unchanged.

@@ -72,7 +72,7 @@ PlaneHits PlaneQuery::find(const PlanePatch& patch) const {
                                 if (test.meetsElement(mesh, mesh.tets[std::size_t(element)]))
                                     hits.elements.push_back(element);
                             });
-    sortAscending(hits.elements);
+    sortEachOnce(hits.elements);
     return hits;
 }
 

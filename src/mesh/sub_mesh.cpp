@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cstring>
 
 #include "base/check.h"
 #include "mesh/element_index.h"
@@ -25,8 +26,8 @@ Field extractField(const Field& field, std::span<const std::int32_t> items) {
     return part;
 }
 
-/// Up to so many corners are numbered by a hash table, more by bits over all nodes.
-constexpr std::size_t kFewCorners = 8192;
+/// Corners are numbered by a hash table where there are few, or few for the range of their nodes.
+constexpr std::size_t kFewCorners = 8192, kNodesPerCorner = 8;
 
 using Tets = std::vector<std::array<std::int32_t, 4>>;
 
@@ -34,7 +35,17 @@ using Tets = std::vector<std::array<std::int32_t, 4>>;
 class NodeNumbers {
   public:
     explicit NodeNumbers(Tets& tets) : tets_(tets) {
-        if (4 * tets.size() <= kFewCorners)
+        if (tets.empty()) return;
+        std::array<std::int32_t, 4> least = tets_[0], most = tets_[0];
+        for (const auto& tet : tets_)
+            for (std::size_t k = 0; k < 4; ++k) {
+                least[k] = std::min(least[k], tet[k]);
+                most[k] = std::max(most[k], tet[k]);
+            }
+        first_ = *std::min_element(least.begin(), least.end());
+        range_ = std::size_t(*std::max_element(most.begin(), most.end()) - first_) + 1;
+        const std::size_t corners = 4 * tets.size();
+        if (corners <= kFewCorners || range_ > kNodesPerCorner * corners)
             numberFew();
         else
             numberMany();
@@ -70,49 +81,34 @@ class NodeNumbers {
             }
             node = std::int32_t(&slot - slots.data());
         });
-        sortAscending(nodes_);
+        sortEachOnce(nodes_);
         for (std::size_t i = 0; i < nodes_.size(); ++i) slotOf(nodes_[i]).place = std::int32_t(i);
         forEachCorner([&](std::int32_t& slot) { slot = slots[std::size_t(slot)].place; });
     }
 
     void numberMany() {
-        struct Word {
-            std::uint32_t bits = 0;
-            std::int32_t before = 0;  // nodes of the words before
-        };
-        std::array<std::int32_t, 4> least = tets_[0], most = tets_[0];
-        for (const auto& tet : tets_)
-            for (std::size_t k = 0; k < 4; ++k) {
-                least[k] = std::min(least[k], tet[k]);
-                most[k] = std::max(most[k], tet[k]);
+        constexpr std::size_t kWord = sizeof(std::uint64_t);
+        static thread_local std::vector<std::uint8_t> isUsed;
+        static thread_local std::vector<std::int32_t> places;  // of nodes in use
+        isUsed.assign(range_ + kWord, 0);
+        if (places.size() < range_) places.resize(range_);
+        forEachCorner([&](const std::int32_t& node) { isUsed[std::size_t(node - first_)] = 1; });
+        for (std::size_t n = 0; n < range_; n += kWord) {
+            std::uint64_t word;
+            std::memcpy(&word, isUsed.data() + n, kWord);
+            for (; word != 0; word &= word - 1) {
+                const std::size_t node = n + std::size_t(std::countr_zero(word)) / 8;
+                places[node] = std::int32_t(nodes_.size());
+                nodes_.push_back(first_ + std::int32_t(node));
             }
-        const std::int32_t first = *std::min_element(least.begin(), least.end()),
-                           last = *std::max_element(most.begin(), most.end());
-        std::vector<Word> words(std::size_t(last - first) / 32 + 1);
-        forEachCorner([&](const std::int32_t& node) {
-            const std::size_t bit = std::size_t(node - first);
-            words[bit / 32].bits |= std::uint32_t(1) << bit % 32;
-        });
-        for (std::size_t w = 0; w < words.size(); ++w) {
-            words[w].before = std::int32_t(nodes_.size());
-            for (std::uint32_t bits = words[w].bits; bits != 0; bits &= bits - 1)
-                nodes_.push_back(first + std::int32_t(32 * w) + std::countr_zero(bits));
         }
-        forEachCorner([&](std::int32_t& node) {
-            const std::size_t bit = std::size_t(node - first);
-            const Word& word = words[bit / 32];
-            node = word.before + bitCount(word.bits & ((std::uint32_t(1) << bit % 32) - 1));
-        });
+        forEachCorner([&](std::int32_t& node) { node = places[std::size_t(node - first_)]; });
     }
 
-    /// std::popcount() is a call where the processor isn't known to have it.
-    static std::int32_t bitCount(std::uint32_t bits) {
-        bits -= (bits >> 1) & 0x55555555;
-        bits = (bits & 0x33333333) + ((bits >> 2) & 0x33333333);
-        return std::int32_t(((bits + (bits >> 4)) & 0x0f0f0f0f) * 0x01010101 >> 24);
-    }
-
+    static_assert(std::endian::native == std::endian::little);
     Tets& tets_;
+    std::int32_t first_ = 0;  // the least node in use
+    std::size_t range_ = 0;   // of nodes from there to the last
     std::vector<std::int32_t> nodes_;
 };
 

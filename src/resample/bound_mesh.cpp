@@ -74,10 +74,7 @@ std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const I
         index.query(boundsWorld(lattice, box, kNearMarginVoxels), elements, most);
         if (elements.size() > most) return std::nullopt;
     }
-    if (boxes.size() > 1) {
-        sortAscending(elements);
-        elements.erase(std::unique(elements.begin(), elements.end()), elements.end());
-    }
+    if (boxes.size() > 1) sortEachOnce(elements);
     return extractElements(whole(), elements, fields_);
 }
 

@@ -701,6 +701,22 @@ void walkElement(Walk& walk, int lane) {
     }
 }
 
+// False for elements beside the region or between its voxels, and for those without a place.
+bool holdsVoxel(const Walk& walk, int lane) {
+    const Batch& batch = walk.scratch.batch;
+    const int axis = int(batch.axis[lane]);
+    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
+    const double low[3] = {std::ceil(batch.minS[lane]), batch.minT[lane], batch.minR[lane]},
+                 high[3] = {std::floor(batch.maxS[lane]), batch.maxT[lane], batch.maxR[lane]};
+    for (int i = 0; i < 3; ++i) {
+        const double base = batch.base[axes[i]][lane];
+        const double from = std::max(low[i], walk.regionMin[axes[i]] - base),
+                     to = std::min(high[i], walk.regionLast[axes[i]] - base);
+        if (!(low[i] <= high[i] && from <= to)) return false;
+    }
+    return true;
+}
+
 // Elements reach for their nodes in no order: fetch those of the next batch while this one is worked, and the
 // elements after that.
 void prefetch(const ScanInput& input, std::span<const std::int32_t> elements, std::size_t begin) {
@@ -740,7 +756,7 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         for (int lane = 0; lane < count; ++lane) {
             if (scratch.batch.grade[lane] != kThin) {
                 walkElement(walk, lane);
-            } else {
+            } else if (holdsVoxel(walk, lane)) {
                 writeRows(walk);
                 scanElementExactly(input, output, batchElements[lane], counts);
             }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -107,6 +108,12 @@ std::vector<ScanChannel> channelsOf(const TetMesh& mesh, std::span<const int> fi
     return channels;
 }
 
+ElementBins everyElement(const TetMesh& mesh) {
+    ElementBins bins{{0, mesh.elementCount()}, std::vector<std::int32_t>(mesh.tets.size())};
+    std::iota(bins.elements.begin(), bins.elements.end(), 0);
+    return bins;
+}
+
 class BoundSoftware : public BoundResampler {
   public:
     BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
@@ -132,7 +139,10 @@ class BoundSoftware : public BoundResampler {
         if (part) channels = channelsOf(*part, everyField(*part));
         const NodeFrame frame = frameNodes(mesh, lattice, execution);
         const ScanInput input{mesh, frame, channels};
-        const ElementBins bins = binElements(mesh, frame, regionBoxes, execution);
+        // The elements near a single region are its own.
+        const ElementBins bins = part && regions.size() == 1
+                                     ? everyElement(mesh)
+                                     : binElements(mesh, frame, regionBoxes, execution);
         statistics.add(counted::elementsNear, mesh.elementCount());
         statistics.add(counted::elementBlockPairs, std::int64_t(bins.elements.size()));
         statistics.addMs(stage::bin, timer.restart());
