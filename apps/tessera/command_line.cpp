@@ -144,8 +144,8 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
         .add_option(
             "--refine", a.refine,
             "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
-            "the measured error is within --max-error")
-        ->check(CLI::IsMember({"uniform", "element-size", "error"}))
+            "the measured error is within --max-error. focus: fine around --focus. Several, such as "
+            "element-size,focus: as fine as any of them wishes")
         ->capture_default_str()
         ->group(group);
     command
@@ -173,6 +173,16 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     command
         .add_option("--error-field", a.errorFields,
                     "error: fields a,b that the bound holds for (default: all point fields chosen)")
+        ->group(group);
+    command
+        .add_option(
+            "--focus", a.focus,
+            "focus: a place x,y,z where bricks have the finest spacing (world units); may be repeated")
+        ->group(group);
+    command
+        .add_option("--radius", a.radius,
+                    "focus: distance from the place up to which spacing is the finest; beyond, it grows in "
+                    "proportion to the distance; once, or for each --focus")
         ->group(group);
     command
         .add_option("--brick-size", a.request.refine.brickCells,

@@ -96,17 +96,51 @@ void checkRanges(const ResampleArguments& a) {
     require(a.request.dryRun || !a.request.output.empty(), "resample: no output given (-o out.vdb)");
 }
 
+Criteria parseCriteria(const std::string& text) {
+    std::optional<Criteria> criteria;
+    for (const std::string& word : split(text, ',')) {
+        std::optional<Criterion> found;
+        for (const Criterion one :
+             {Criterion::uniform, Criterion::elementSize, Criterion::error, Criterion::focus})
+            if (nameOf(one) == word) found = one;
+        require(found.has_value(),
+                fmt::format("--refine: expected uniform, element-size, error, focus, or several separated by "
+                            "commas, got {}",
+                            text));
+        criteria = criteria ? *criteria | *found : Criteria(*found);
+    }
+    require(criteria.has_value(), "--refine: no criterion given");
+    require(!criteria->has(Criterion::uniform) || criteria->isOnly(Criterion::uniform),
+            "--refine uniform goes with no other criterion");
+    return *criteria;
+}
+
+std::vector<Focus> parseFocus(const ResampleArguments& a) {
+    require(!a.focus.empty(), "--refine focus needs --focus x,y,z");
+    require(a.radius.size() == 1 || a.radius.size() == a.focus.size(),
+            "--focus needs --radius r, once or for each place");
+    std::vector<Focus> places;
+    for (const std::string& text : a.focus) {
+        const double radius = a.radius[a.radius.size() == 1 ? 0 : places.size()];
+        requirePositive("--radius", radius);
+        places.push_back(pointFocus(parseVector("--focus", text), radius));
+    }
+    return places;
+}
+
 RefineOptions refineOptions(const ResampleArguments& a) {
     RefineOptions r = a.request.refine;
-    if (a.refine == "uniform") {
-        r.criterion = Criterion::uniform;
+    r.criterion = parseCriteria(a.refine);
+    if (r.criterion.has(Criterion::uniform)) {
         require(a.resolution || a.spacing || !a.request.like.empty(),
                 "--refine uniform needs --resolution N, --spacing h or --like file.vdb");
-    } else if (a.refine == "error") {
-        r.criterion = Criterion::error;
+    } else if (r.criterion.has(Criterion::error)) {
         require(a.maxError.has_value(), "--refine error needs --max-error (a number, or a share such as 1%)");
     }
-    require(!a.maxError || r.criterion == Criterion::error, "--max-error needs --refine error");
+    require(!a.maxError || r.criterion.has(Criterion::error), "--max-error needs --refine error");
+    if (r.criterion.has(Criterion::focus)) r.focus = parseFocus(a);
+    require(r.criterion.has(Criterion::focus) || (a.focus.empty() && a.radius.empty()),
+            "--focus and --radius need --refine focus");
     if (a.maxError) {
         const bool relative = a.maxError->ends_with('%');
         const std::string digits = relative ? a.maxError->substr(0, a.maxError->size() - 1) : *a.maxError;
@@ -182,7 +216,7 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
     r.refine = refineOptions(a);
     if (!a.fields.empty()) r.fields = parseFields(a.fields);
     if (!a.errorFields.empty()) {
-        require(a.refine == "error", "--error-field needs --refine error");
+        require(r.refine.criterion.has(Criterion::error), "--error-field needs --refine error");
         for (const FieldChoice& choice : parseFields(a.errorFields)) r.errorFields.push_back(choice.source);
     }
     r.format = &outputFormat(a);
@@ -193,7 +227,7 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
     r.write.voxelShift = a.file.voxelShift.value_or(0);
     r.write.unitScale = a.unitScale.value_or(0);
     r.write.sampleFormat = lossyFormat(r.refine.bind);
-    r.write.criterion = a.refine;
+    r.write.criterion = nameOf(r.refine.criterion);
     r.write.maxVoxels = r.refine.maxVoxels;
     r.shape.layout = r.write.layout;
     r.shape.layers = a.file.extendLayers.value_or(r.write.layout == VdbLayout::flat ? 1 : 0);

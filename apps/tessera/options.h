@@ -52,7 +52,9 @@ struct ResampleArguments {
     ProgramChoices file;
     std::string format;  ///< of standard output; empty: the default
     std::string refine = "element-size", errorMeasure = "max";
-    std::string times;  ///< "a:b"; empty: all
+    std::vector<std::string> focus;  ///< "x,y,z" each
+    std::vector<double> radius;      ///< one for each focus, or one for all
+    std::string times;               ///< "a:b"; empty: all
     std::string fields, errorFields, bounds, maxVoxels;
     std::optional<int> resolution, maxLevels;
     std::optional<double> spacing;

@@ -5,19 +5,42 @@
 #include <string>
 #include <vector>
 
+#include "tessera/focus.h"
 #include "tessera/vec.h"
 
 namespace tessera {
 
 /// What decides how fine bricks are.
-enum class Criterion {
-    /// One spacing everywhere: `resolution` or `spacingWorld`.
-    uniform,
+enum class Criterion : unsigned {
+    /// One spacing everywhere: `resolution` or `spacingWorld`. Not with others.
+    uniform = 1,
     /// `samplesPerElement` along the edges of the elements that are there.
-    elementSize,
+    elementSize = 2,
     /// Bricks are halved until the measured error is within `maxError`.
-    error
+    error = 4,
+    /// The finest spacing around the places of `focus`, coarser with the distance from them.
+    focus = 8
 };
+
+/// One criterion, or several combined by |: bricks are then as fine as the one that wishes for the finest.
+class Criteria {
+  public:
+    constexpr Criteria(Criterion criterion) : bits_(unsigned(criterion)) {}
+    constexpr bool has(Criterion criterion) const { return (bits_ & unsigned(criterion)) != 0; }
+    constexpr bool isOnly(Criterion criterion) const { return bits_ == unsigned(criterion); }
+    friend constexpr Criteria operator|(Criteria a, Criteria b) {
+        a.bits_ |= b.bits_;
+        return a;
+    }
+
+  private:
+    unsigned bits_;
+};
+constexpr Criteria operator|(Criterion a, Criterion b) {
+    return Criteria(a) | Criteria(b);
+}
+/// Words separated by commas: "uniform", "element-size", "error", "focus".
+std::string nameOf(Criteria criteria);
 
 /// Which error a bound holds for: the largest of all, or the root of the mean square over the mesh's volume.
 enum class ErrorMeasure { max, rms };
@@ -39,9 +62,9 @@ struct BrickOptions {
     /// Names of fields; "point:T" and "cell:T" tell two of one name apart. Empty: all.
     std::vector<std::string> fields{};
 
-    Criterion criterion = Criterion::elementSize;
+    Criteria criterion = Criterion::elementSize;
     /// The finest spacing as a number of lattice points along the longest axis of the bounds, at least 2; 0:
-    /// not given.
+    /// not given. Around a focus it is then that of 256 points.
     int resolution = 0;
     /// The finest spacing, world units; 0: not given. Not beside `resolution`.
     double spacingWorld = 0;
@@ -56,6 +79,9 @@ struct BrickOptions {
     ErrorMeasure errorMeasure = ErrorMeasure::max;
     /// Names of the fields that the bound holds for; empty: all point fields chosen.
     std::vector<std::string> errorFields{};
+
+    /// focus: where bricks are to be fine, one place at least.
+    std::vector<Focus> focus{};
 
     /// Cells along a brick's edge: 8, 16, 32 or 64.
     int brickCells = 16;

@@ -127,7 +127,7 @@ void ResampleRun::takeLattice() {
 
 /// Weights are rough shares of a usual run's time.
 void ResampleRun::declareStages() const {
-    const bool byError = request_.refine.criterion == Criterion::error;
+    const bool byError = request_.refine.criterion.has(Criterion::error);
     std::vector<ExpectedStage> stages{{Stage::reading, 0.4}};
     if (request_.repair) stages.push_back({Stage::repairing, 0.4});
     stages.push_back({Stage::planning, 0.1});
@@ -155,7 +155,7 @@ void ResampleRun::surveySeries(const std::vector<ResampleStep>& steps) {
     SeriesSummary summary;
     for (std::size_t i = 0; i < steps.size(); ++i) {
         // A look is a reading and a plan; by the error it is all but the writing.
-        const double look = request_.refine.criterion == Criterion::error ? 0.75 : 0.25;
+        const double look = request_.refine.criterion.has(Criterion::error) ? 0.75 : 0.25;
         job_.execution.beginStep(fmt::format("looking at step {} of {}", i + 1, steps.size()), look,
                                  double(steps.size()) + look * double(steps.size() - 1 - i));
         const TetMesh mesh = read(steps[i]).mesh;
@@ -179,7 +179,7 @@ void ResampleRun::surveySpacing(const TetMesh& mesh) {
     const StepPlan plan = planStep(mesh, request_);
     const FieldSelection& selection = plan.selection;
     const BrickTree tree =
-        plan.refine.criterion == Criterion::error
+        plan.refine.criterion.has(Criterion::error)
             ? refineAndResample(mesh, selection.fields, *choice_.resampler, plan.refine, job_.execution).tree
             : planBricks(mesh, plan.refine, job_.execution, selection.channels);
     if (!seriesFrame_ || tree.spacingWorld() < seriesFrame_->spacingWorld)

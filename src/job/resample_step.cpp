@@ -23,7 +23,7 @@ void dryRun(const TetMesh& mesh, const StepPlan& plan, const Resampler& resample
     Timer timer;
     const FieldSelection& selection = plan.selection;
     BrickResult& bricks = result.bricks;
-    if (plan.refine.criterion == Criterion::error) {
+    if (plan.refine.criterion.has(Criterion::error)) {
         // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
         bricks = refineAndResample(mesh, selection.fields, resampler, plan.refine, execution);
         bricks.store = {};
@@ -81,7 +81,7 @@ void write(const ResampleStep& step, const TetMesh& mesh, const StepPlan& plan,
 
 /// The bound is judged by what the file shows.
 void judgeFile(const TetMesh& mesh, const StepPlan& plan, BrickResult& bricks) {
-    if (plan.refine.criterion != Criterion::error || !bricks.bounded) return;
+    if (!plan.refine.criterion.has(Criterion::error) || !bricks.bounded) return;
     std::string exceeded = exceededBound(mesh, plan.selection.fields, plan.refine, bricks.report);
     if (exceeded.empty() && bricks.report.incomplete > 0)
         exceeded = fmt::format("{} places beside voxels that it doesn't hold (--extend 1 adds them)",
@@ -135,7 +135,7 @@ std::string stepText(const StepResult& result, const ResampleRequest& request, s
     if (bricks.samplesReport)
         text +=
             "  the samples before they became the file's voxels:\n" + errorText(*bricks.samplesReport, width);
-    if (request.refine.criterion == Criterion::error && bricks.bounded)
+    if (request.refine.criterion.has(Criterion::error) && bricks.bounded)
         text += "  the error is within the bound\n";
     for (const std::string& note : result.file.notes) text += "  " + note + "\n";
     return text;
@@ -156,7 +156,7 @@ Json stepJson(const StepResult& result, const ResampleRequest& request) {
     json["coverage"] = coverageJson(bricks.report);
     json["error"] = errorJson(bricks.report);
     if (bricks.samplesReport) json["samples_error"] = errorJson(*bricks.samplesReport);
-    if (refine.criterion == Criterion::error)
+    if (refine.criterion.has(Criterion::error))
         json["refinement"] = {{"max_error", refine.maxError},
                               {"relative", refine.maxErrorIsRelative},
                               {"measure", refine.measure == ErrorMeasure::rms ? "rms" : "max"},
@@ -173,7 +173,7 @@ Json stepJson(const StepResult& result, const ResampleRequest& request) {
 
 std::vector<std::string> shortfalls(const StepResult& result, const ResampleRequest& request) {
     std::vector<std::string> sentences;
-    if (request.refine.criterion == Criterion::error && !result.bricks.bounded)
+    if (request.refine.criterion.has(Criterion::error) && !result.bricks.bounded)
         sentences.push_back("the error is not within the bound: " + result.bricks.stoppedBecause);
     sentences.insert(sentences.end(), result.bricks.notes.begin(), result.bricks.notes.end());
     if (request.shape.layout == VdbLayout::flat && !result.flat.note.empty())

@@ -18,7 +18,7 @@ namespace {
 constexpr double kFarthestVoxel = 0x1p30;
 
 RefineOptions refineOptions(const TetMesh& mesh, const ChosenFields& chosen, const BrickOptions& options) {
-    if (!options.errorFields.empty() && options.criterion != Criterion::error)
+    if (!options.errorFields.empty() && !options.criterion.has(Criterion::error))
         throw InputError("errorFields need Criterion::error");
     RefineOptions refine;
     refine.criterion = options.criterion;
@@ -32,6 +32,7 @@ RefineOptions refineOptions(const TetMesh& mesh, const ChosenFields& chosen, con
     refine.measure = options.errorMeasure;
     for (const std::string& name : options.errorFields)
         refine.errorFields.push_back(findField(mesh, chosen.fields, name));
+    refine.focus = options.focus;
     refine.maxVoxels = options.maxVoxels;
     refine.maxMemoryBytes = options.maxMemoryBytes;
     refine.boundsWorld = options.boundsWorld;
@@ -91,7 +92,7 @@ const ErrorReport& Bricks::report() const {
 }
 
 bool Bricks::isWithinBound() const {
-    return parts_->options.criterion != Criterion::error || parts_->result.bounded;
+    return !parts_->options.criterion.has(Criterion::error) || parts_->result.bounded;
 }
 
 const std::string& Bricks::stoppedBecause() const {

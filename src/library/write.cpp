@@ -64,18 +64,6 @@ std::vector<OutputField> namedFields(const Bricks::Parts& parts, const OutputOpt
     return outputs;
 }
 
-std::string nameOf(Criterion criterion) {
-    switch (criterion) {
-        case Criterion::uniform:
-            return "uniform";
-        case Criterion::elementSize:
-            return "element-size";
-        case Criterion::error:
-            break;
-    }
-    return "error";
-}
-
 VdbWriteOptions writeOptions(const Bricks::Parts& parts, const OutputOptions& options, VdbLayout layout,
                              int layers) {
     VdbWriteOptions write;
@@ -102,8 +90,8 @@ VdbWriteOptions writeOptions(const Bricks::Parts& parts, const OutputOptions& op
 
 /// The bound is judged by what the file shows.
 bool isFileWithinBound(const Bricks::Parts& parts, std::vector<std::string>& notes) {
-    if (parts.options.criterion != Criterion::error || !parts.result.bounded)
-        return parts.options.criterion != Criterion::error;
+    const bool isByError = parts.options.criterion.has(Criterion::error);
+    if (!isByError || !parts.result.bounded) return !isByError;
     std::string exceeded = exceededBound(*parts.mesh, parts.chosen.fields, parts.refine, parts.result.report);
     if (exceeded.empty() && parts.result.report.incomplete > 0)
         exceeded = std::to_string(parts.result.report.incomplete) +

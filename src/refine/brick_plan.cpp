@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "base/parallel.h"
-#include "brick/kept_points.h"
+#include "refine/brick_touch.h"
 #include "tessera/lattice.h"
 
 namespace tessera {
@@ -16,39 +16,6 @@ namespace {
 
 constexpr std::int64_t kElementChunk = 16384;
 constexpr double kDenseLimit = double(1 << 25);  // bricks of a dense grid of marks
-
-// Keeps every brick with points that reading inside the bounds can need.
-bool insideBounds(const DepthKey& key, const PlanFrame& frame) {
-    if (!frame.boundsWorld) return true;
-    const IndexBox kept =
-        KeptPoints(frame.boundsWorld, frame.originWorld, frame.spacingWorld(key.depth), 2).range(0);
-    const Vec3i first = key.index * frame.brickCells;
-    return !intersect(kept, {first, first + frame.brickCells}).empty();
-}
-
-// Bricks whose touch boxes may meet a box in index space.
-BrickRange bricksMeeting(const Box3d& index, int brickCells) {
-    // What lies beyond the range of indices is far outside the bounds; it must not overflow here.
-    constexpr double kFar = 1 << 30;
-    const double inverse = 1.0 / brickCells;
-    const Vec3d low = glm::clamp(index.min * inverse, Vec3d(-kFar), Vec3d(kFar));
-    const Vec3d high = glm::clamp((index.max + kBrickSlackVoxels) * inverse, Vec3d(-kFar), Vec3d(kFar));
-    return {{floorToInt(low.x), floorToInt(low.y), floorToInt(low.z)},
-            {floorToInt(high.x), floorToInt(high.y), floorToInt(high.z)}};
-}
-
-BrickRange clippedRange(const PlanFrame& frame, Depth depth) {
-    const double inverse = 1.0 / frame.spacingWorld(depth);
-    Box3d box{(frame.meshBoundsWorld.min - frame.originWorld) * inverse,
-              (frame.meshBoundsWorld.max - frame.originWorld) * inverse};
-    if (frame.boundsWorld) {
-        box.min = glm::max(box.min,
-                           (frame.boundsWorld->min - frame.originWorld) * inverse - (2.0 + frame.brickCells));
-        box.max = glm::min(box.max,
-                           (frame.boundsWorld->max - frame.originWorld) * inverse + (2.0 + frame.brickCells));
-    }
-    return bricksMeeting(box, frame.brickCells);
-}
 
 double rangeCount(const BrickRange& range) {
     const Vec3d n = Vec3d(range.max) - Vec3d(range.min) + 1.0;
@@ -66,82 +33,10 @@ Box3d brickTouchBox(const Vec3i& index, int brickCells) {
     return {first - kBrickSlackVoxels, first + double(brickCells)};
 }
 
-namespace {
-
-/// The eight children of a brick, and which of them an element touches.
-class BrickChildren {
-  public:
-    BrickChildren(const DepthKey& parent, const PlanFrame& frame) {
-        for (unsigned c = 0; c < 8; ++c) {
-            keys_[c] = childKey(parent, c);
-            boxes_[c] = brickTouchBox(keys_[c].index, frame.brickCells);
-            allowed_[c] = insideBounds(keys_[c], frame);
-        }
-    }
-    const DepthKey& key(unsigned child) const { return keys_[child]; }
-
-    /// @param element one that touches the parent, in index space of the children's depth.
-    ChildBits touchedBy(const ElementOverlap& element) const {
-        // Per axis the lower and the upper children share their bounds.
-        const Box3d& own = element.bounds();
-        std::array<bool, 6> touched;
-        for (int a = 0; a < 3; ++a)
-            for (int upper = 0; upper < 2; ++upper) {
-                const Box3d& half = boxes_[upper ? 7 : 0];
-                touched[std::size_t(2 * a + upper)] = own.min[a] < half.max[a] && own.max[a] >= half.min[a];
-            }
-        unsigned bits = 0;
-        for (std::size_t c = 0; c < 8; ++c)
-            if (allowed_[c] && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
-                bits |= 1u << c;
-        if (std::has_single_bit(bits)) return ChildBits(bits);
-        for (std::size_t c = 0; c < 8; ++c)
-            if ((bits >> c & 1) && !element.touches(boxes_[c])) bits &= ~(1u << c);
-        return ChildBits(bits);
-    }
-
-  private:
-    std::array<DepthKey, 8> keys_;
-    std::array<Box3d, 8> boxes_;
-    std::array<bool, 8> allowed_;
-};
-
-/// The bricks of depth 0 that an element can touch.
-BrickRange rootsMeeting(const ElementOverlap& element, const PlanFrame& frame, const BrickRange& all) {
-    const BrickRange range = bricksMeeting(element.bounds(), frame.brickCells);
-    return {glm::max(range.min, all.min), glm::min(range.max, all.max)};
-}
-
-bool touchesRoot(const ElementOverlap& element, const BrickRange& roots, const Vec3i& root,
-                 const PlanFrame& frame) {
-    if (!insideBounds({Depth(0), root}, frame)) return false;
-    const Box3d box = brickTouchBox(root, frame.brickCells);
-    return roots.min == roots.max ? element.boundsTouch(box) : element.touches(box);
-}
-
-/// A box that holds whatever counts as touching the brick, world units.
-Box3d boxAround(const DepthKey& key, const PlanFrame& frame) {
-    const double spacing = frame.spacingWorld(key.depth);
-    const Box3d box = brickTouchBox(key.index, frame.brickCells);
-    Box3d world{frame.originWorld + box.min * spacing, frame.originWorld + box.max * spacing};
-    const Vec3d most = glm::max(glm::abs(world.min), glm::abs(world.max)) + glm::abs(frame.originWorld);
-    const Vec3d margin = spacing * 0x1p-16 + most * 0x1p-50;
-    world.min -= margin;
-    world.max += margin;
-    return world;
-}
-
-}  // namespace
-
 BrickPlan::BrickPlan(const TetMesh& mesh, const PlanFrame& frame, const Execution& execution,
                      const ElementIndex* index)
     : mesh_(&mesh), frame_(frame), rootRange_(clippedRange(frame, Depth(0))) {
     allocateRoots(index, execution);
-}
-
-ElementOverlap BrickPlan::overlap(std::int32_t element, Depth depth) const {
-    return ElementOverlap(
-        elementInIndexSpace(*mesh_, element, frame_.originWorld, frame_.spacingWorld(depth)));
 }
 
 void BrickPlan::allocateRoots(const ElementIndex* index, const Execution& execution) {
@@ -161,7 +56,7 @@ void BrickPlan::allocateRoots(const ElementIndex* index, const Execution& execut
         auto& list = found[std::size_t(begin / kElementChunk)];
         for (std::int64_t n = begin; n < end; ++n) {
             prefetchNodes(*mesh_, element(std::min(n + kPrefetchElements, count - 1)));
-            const ElementOverlap own = overlap(element(n), Depth(0));
+            const ElementOverlap own = overlapOf(*mesh_, frame_, element(n), Depth(0));
             const BrickRange range = rootsMeeting(own, frame_, rootRange_);
             for (int z = range.min.z; z <= range.max.z; ++z)
                 for (int y = range.min.y; y <= range.max.y; ++y)
@@ -200,7 +95,7 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
     for (std::size_t n = 0; n < count; ++n) {
         const std::int32_t e = brick.elements[n];
         prefetchNodes(*mesh_, brick.elements[std::min(n + std::size_t(kPrefetchElements), count - 1)]);
-        unsigned bits = children.touchedBy(overlap(e, brick.key.depth + 1));
+        unsigned bits = children.touchedBy(overlapOf(*mesh_, frame_, e, brick.key.depth + 1));
         for (; bits != 0; bits &= bits - 1) made[std::size_t(std::countr_zero(bits))].elements.push_back(e);
     }
     splitSamples(brick, made);
@@ -211,21 +106,8 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
 std::vector<std::int32_t> BrickPlan::elementsOf(const DepthKey& key, const ElementIndex& index) const {
     std::vector<std::int32_t> elements;
     index.query(boxAround(key, frame_), elements);
-    const int depths = key.depth.halvings();
-    const Vec3i root = key.index >> depths;
-    std::vector<BrickChildren> path;  // of the bricks above
-    for (int d = 0; d < depths; ++d) path.emplace_back(DepthKey{Depth(d), key.index >> (depths - d)}, frame_);
-    std::erase_if(elements, [&](std::int32_t e) {
-        const ElementOverlap own = overlap(e, Depth(0));
-        const BrickRange roots = rootsMeeting(own, frame_, rootRange_);
-        if (glm::clamp(root, roots.min, roots.max) != root || !touchesRoot(own, roots, root, frame_))
-            return true;
-        for (int d = 0; d < depths; ++d) {
-            const unsigned child = childNumber(key.index >> (depths - d - 1));
-            if (!(path[std::size_t(d)].touchedBy(overlap(e, Depth(d + 1))) >> child & 1)) return true;
-        }
-        return false;
-    });
+    const BrickPath path(*mesh_, frame_, rootRange_, key);
+    std::erase_if(elements, [&](std::int32_t e) { return !path.holds(e); });
     return elements;
 }
 

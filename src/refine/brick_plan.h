@@ -75,7 +75,6 @@ class BrickPlan {
     std::function<Vec3d(std::uint32_t)> placeOfSample;
 
   private:
-    ElementOverlap overlap(std::int32_t element, Depth depth) const;
     void allocateRoots(const ElementIndex* index, const Execution& execution);
     std::vector<std::int32_t> elementsOf(const DepthKey& key, const ElementIndex& index) const;
     std::vector<PlannedBrick> children(const PlannedBrick& brick) const;

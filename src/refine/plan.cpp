@@ -7,44 +7,19 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "refine/element_size.h"
 #include "refine/plan_frame.h"
 #include "refine/refine_options.h"
+#include "refine/wish_plan.h"
+#include "refine/wishes.h"
 #include "tessera/error.h"
 
 namespace tessera {
 
 namespace {
 
-// Share of a brick's elements that may be smaller than the size its spacing follows. The quantile counts
-// elements, not volume: by volume a graded region much smaller than the brick would never be seen.
-constexpr double kSizeQuantile = 0.15;
 // Without any bound or spacing from the user a plan by element size stays below this.
 constexpr std::int64_t kDefaultElementSizeVoxels = 20'000'000;
-
-// An element's size: the geometric mean of its six edges, in units of `unit`. Slivers have ordinary edges and
-// so an ordinary size; flat boundary-layer elements come out between their thickness and their length.
-// Elements outside the bounds have none.
-std::vector<float> elementSizes(const TetMesh& mesh, double unit, const std::optional<Box3d>& boundsWorld,
-                                const Execution& execution) {
-    std::vector<float> sizes(mesh.tets.size());
-    parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t e = begin; e < end; ++e) {
-            prefetchNodes(mesh, std::min(e + kPrefetchElements, mesh.elementCount() - 1));
-            if (boundsWorld &&
-                !ElementOverlap(elementInIndexSpace(mesh, e, Vec3d(0), 1)).touches(*boundsWorld))
-                continue;
-            const auto nodes = elementInIndexSpace(mesh, e, Vec3d(0), unit);
-            double product = 1;
-            for (std::size_t a = 0; a < 4; ++a)
-                for (std::size_t b = a + 1; b < 4; ++b) {
-                    const Vec3d edge = nodes[b] - nodes[a];
-                    product *= glm::dot(edge, edge);
-                }
-            sizes[std::size_t(e)] = float(std::pow(product, 1.0 / 12));
-        }
-    });
-    return sizes;
-}
 
 // A box inside a mesh may hold few elements: the coarsest spacing is what the largest of them asks for, up to
 // two points along the box.
@@ -61,7 +36,7 @@ void coarsenRoot(PlanFrame& frame, std::vector<float>& sizes, double samplesPerE
 
 // Whether the size that a brick's spacing follows, the kSizeQuantile quantile of its elements' sizes, is too
 // small for a spacing. Counting tells without sorting; elements without a size don't count.
-bool isTooCoarse(const PlannedBrick& brick, const std::vector<float>& sizes, double spacing,
+bool hasTooSmall(const PlannedBrick& brick, const std::vector<float>& sizes, double spacing,
                  double samplesPerElement) {
     std::int64_t count = 0, smaller = 0;
     for (const std::int32_t e : brick.elements) {
@@ -70,7 +45,7 @@ bool isTooCoarse(const PlannedBrick& brick, const std::vector<float>& sizes, dou
         ++count;
         smaller += spacing > double(size) / samplesPerElement;
     }
-    return smaller > std::int64_t(kSizeQuantile * double(count));
+    return smaller > mostTooSmall(count);
 }
 
 std::int64_t countUniform(const TetMesh& mesh, PlanFrame frame, std::size_t maxLeaves,
@@ -172,7 +147,7 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
             const PlannedBrick& brick = *leaves[std::size_t(i)];
             if (brick.key.depth != depth) return;
             const double spacing = std::ldexp(1.0, -d);  // in units of the root spacing, as the sizes are
-            wanted[std::size_t(i)] = isTooCoarse(brick, sizes, spacing, options.samplesPerElement) ? 1 : 0;
+            wanted[std::size_t(i)] = hasTooSmall(brick, sizes, spacing, options.samplesPerElement) ? 1 : 0;
         });
         std::vector<DepthKey> splits;
         for (std::size_t i = 0; i < leaves.size(); ++i)
@@ -193,17 +168,55 @@ BrickTree planByElementSize(const TetMesh& mesh, const Box3d& meshBox, const Ref
     return plan.tree(options.frame ? frame.maxDepth : plan.deepest());
 }
 
+BrickTree planByWishes(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
+                       std::size_t maxLeaves, const Execution& execution, std::vector<std::string>* notes) {
+    const std::size_t brickPoints = std::size_t(std::pow(options.brickCells, 3));
+    const bool isDefault = options.maxVoxels == 0 && options.maxMemoryBytes == 0;
+    if (isDefault && options.criterion.has(Criterion::elementSize) && !hasFinestSpacing(options))
+        maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
+    WishPlanning planning(mesh, meshBox, options, maxLeaves, execution);
+    planning.plan.complete(execution);
+    const GrowingTree& tree = planning.plan.tree();
+    const PlanFrame& frame = planning.bricks.frame();
+    if (planning.plan.isCutShort() && notes) {
+        std::int64_t unmet = 0;
+        for (const GrowingLeaf& leaf : tree.leaves()) {
+            const MeshBricks::Number brick = *planning.bricks.find(leaf.key);
+            unmet += isTooCoarse(planning.bricks.spacingWorld(brick), planning.plan.wishedSpacing(brick));
+        }
+        notes->push_back("no more than " + shortNumber(double(maxLeaves * brickPoints)) +
+                         " voxels fit: " + std::to_string(unmet) + " of " + std::to_string(tree.leafCount()) +
+                         " bricks are coarser than wished for; the finest spacing is " +
+                         shortNumber(frame.spacingWorld(tree.deepest())));
+    }
+    return tree.brickTree(frame.originWorld, frame.rootSpacingWorld, frame.brickCells,
+                          options.frame ? frame.maxDepth : tree.deepest());
+}
+
 }  // namespace
+
+WishPlanning::WishPlanning(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,
+                           std::size_t maxLeaves, const Execution& execution)
+    : bricks(options.bind.index ? options.bind.index : std::make_shared<const SharedElementIndex>(mesh),
+             chooseFrame(meshBox, options),
+             options.criterion.has(Criterion::elementSize) ? options.samplesPerElement : 0, execution),
+      plan(bricks,
+           {options.criterion.has(Criterion::focus) ? options.focus : std::vector<Focus>{},
+            focusSpacing(meshBox, options)},
+           {PlanLimit::Counts::leaves, maxLeaves}) {}
 
 BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,
                      int channels, std::vector<std::string>* notes) {
     const Box3d meshBox = meshBounds(mesh, execution, builtIndex(options));
     checkOptions(mesh, meshBox, options);
-    TESSERA_CHECK(options.criterion != Criterion::error, "error-driven refinement plans as it samples");
+    const Criteria criteria = options.criterion;
+    TESSERA_CHECK(!criteria.has(Criterion::error), "error-driven refinement plans as it samples");
     execution.report(Stage::planning, 0, 1);
     const std::size_t maxLeaves = leafBudget(options, channels);
-    BrickTree tree = options.criterion == Criterion::uniform
+    BrickTree tree = criteria.has(Criterion::uniform)
                          ? planUniform(mesh, meshBox, options, maxLeaves, execution)
+                     : criteria.has(Criterion::focus)
+                         ? planByWishes(mesh, meshBox, options, maxLeaves, execution, notes)
                          : planByElementSize(mesh, meshBox, options, maxLeaves, execution, notes);
     if (tree.leafCount() == 0) throw InputError("the bounds do not meet the mesh");
     execution.report(Stage::planning, 1, 1);

@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "brick/brick_tree.h"
+#include "refine/mesh_bricks.h"
 #include "refine/refine_options.h"
+#include "refine/wish_plan.h"
 #include "tessera/execution.h"
 #include "tessera/mesh.h"
 
@@ -21,12 +23,21 @@ struct PlanEstimate {
 };
 
 /// The chosen leaf bricks. Throws InputError when the smallest sensible plan exceeds maxVoxels or
-/// maxMemoryBytes (the message says what would fit). For Criterion::uniform and elementSize; error-driven
-/// refinement samples as it goes, see refineAndResample.
+/// maxMemoryBytes (the message says what would fit); a plan around focuses then leaves out what is worth
+/// least. Error-driven refinement samples as it goes, see refineAndResample.
 /// @param channels components of all fields that will be sampled: what a point costs.
 /// @param notes when not null, receives sentences for the user (a plan coarsened to keep a default bound).
 BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,
                      int channels = 1, std::vector<std::string>* notes = nullptr);
+
+/// A plan by the sizes of elements and focuses, as far as the options ask for them.
+struct WishPlanning {
+    /// Throws InputError when the coarsest bricks are more than maxLeaves.
+    WishPlanning(const TetMesh& mesh, const Box3d& meshBoundsWorld, const RefineOptions& options,
+                 std::size_t maxLeaves, const Execution& execution);
+    MeshBricks bricks;
+    WishPlan plan;
+};
 
 PlanEstimate estimatePlan(const BrickTree& tree, int channels);
 

@@ -13,6 +13,7 @@
 #include "base/text.h"
 #include "refine/node_set.h"
 #include "refine/refine_options.h"
+#include "refine/wishes.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -144,9 +145,15 @@ void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions
             "the number of levels must be at least 1, not " + std::to_string(options.maxLevels));
     require(options.maxVoxels >= 0 && options.maxMemoryBytes >= 0,
             "bounds on voxels and memory must be positive");
-    if (options.criterion == Criterion::error)
+    if (options.criterion.has(Criterion::error))
         require(std::isfinite(options.maxError) && options.maxError > 0,
                 "the error bound must be positive, not " + shortNumber(options.maxError, 6));
+    if (options.criterion.has(Criterion::focus)) {
+        require(!options.focus.empty(), "refinement around a focus needs a place");
+        checkFocus(options.focus);
+    }
+    require(!options.criterion.has(Criterion::uniform) || options.criterion.isOnly(Criterion::uniform),
+            "a uniform spacing goes with no other criterion");
     if (options.frame)
         require(finite(options.frame->originWorld) && std::isfinite(options.frame->spacingWorld) &&
                     options.frame->spacingWorld > 0,
@@ -161,6 +168,10 @@ void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions
     }
 }
 
+double focusSpacing(const Box3d& meshBox, const RefineOptions& options) {
+    return finestSpacing(options, longestSide(options.boundsWorld ? *options.boundsWorld : meshBox));
+}
+
 PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     const Box3d box = options.boundsWorld ? *options.boundsWorld : meshBox;
     const Box3d sampled{glm::max(box.min, meshBox.min), glm::min(box.max, meshBox.max)};
@@ -172,10 +183,13 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     frame.boundsWorld = options.boundsWorld;
     frame.meshBoundsWorld = meshBox;
     frame.originWorld = options.frame ? options.frame->originWorld : box.min;
-    const int levels = options.maxLevels > 0                         ? options.maxLevels
-                       : options.criterion == Criterion::elementSize ? kDefaultLevels
-                                                                     : 31;
-    if (options.criterion == Criterion::uniform || hasFinestSpacing(options)) {
+    const Criteria criteria = options.criterion;
+    const int levels = options.maxLevels > 0 ? options.maxLevels
+                       : criteria.has(Criterion::elementSize) && !criteria.has(Criterion::error)
+                           ? kDefaultLevels
+                           : 31;
+    if (criteria.isOnly(Criterion::uniform) || criteria.isOnly(Criterion::focus) ||
+        hasFinestSpacing(options)) {
         const double finest = finestSpacing(options, longest);
         const double far = farthestIndex(sampled, frame.originWorld, finest);
         if (!(far < kMaxIndex))
@@ -183,7 +197,7 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
                              " lattice points along an axis, more than 2^29; the finest that fits is " +
                              shortNumber(finest * far / kMaxIndex * 1.01, 6));
         int depth = 0;
-        if (options.criterion != Criterion::uniform)
+        if (!criteria.has(Criterion::uniform))
             while (depth + 1 < levels && longest / std::ldexp(finest, depth + 1) >= rootCells) ++depth;
         frame.rootSpacingWorld = std::ldexp(finest, depth);
         frame.maxDepth = Depth(depth);
@@ -191,7 +205,7 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     }
     frame.rootSpacingWorld = longest / rootCells;
     // A box to look at closely needn't hold many elements: refinement by error starts from few points there.
-    if (options.boundsWorld && options.criterion == Criterion::error && options.maxLevels == 0)
+    if (options.boundsWorld && criteria.isOnly(Criterion::error) && options.maxLevels == 0)
         while (frame.rootSpacingWorld * options.brickCells < longest) frame.rootSpacingWorld *= 2;
     const double far = std::max(1.0, farthestIndex(sampled, frame.originWorld, frame.rootSpacingWorld));
     int depth = 0;

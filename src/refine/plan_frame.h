@@ -27,6 +27,9 @@ inline bool hasFinestSpacing(const RefineOptions& options) {
 /// has every finer one.
 PlanFrame chooseFrame(const Box3d& meshBoundsWorld, const RefineOptions& options);
 
+/// The finest spacing, or that of 256 points where none is given: h_0 of focuses.
+double focusSpacing(const Box3d& meshBoundsWorld, const RefineOptions& options);
+
 /// Leaves that the bounds on voxels and memory allow.
 std::size_t leafBudget(const RefineOptions& options, int channels);
 

@@ -132,7 +132,11 @@ class ErrorRefinement {
         const std::int64_t b = options_.brickCells;
         return b * b * b;
     }
+    std::string budgetText() const {
+        return "the bound on voxels (" + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + ")";
+    }
     void takeSamples();
+    void splitByWishes();
     void sampleNewLeaves();
     void measureChanged();
     double expectedLater(double now) const;
@@ -178,6 +182,21 @@ void ErrorRefinement::takeSamples() {
         const auto ids = sorted.of(std::size_t(leaf));
         brick->samples.assign(ids.begin(), ids.end());
     }
+}
+
+// Other criteria ask for bricks before any error is known.
+void ErrorRefinement::splitByWishes() {
+    if (options_.criterion.isOnly(Criterion::error)) return;
+    WishPlanning planning(mesh_, plan_.frame().meshBoundsWorld, options_, budgetLeaves_, execution_);
+    std::vector<std::vector<DepthKey>> ofDepth;
+    while (const auto split = planning.plan.next()) {
+        const DepthKey& key = planning.bricks.key(split->brick);
+        ofDepth.resize(std::max(ofDepth.size(), std::size_t(key.depth.halvings()) + 1));
+        ofDepth[std::size_t(key.depth.halvings())].push_back(key);
+        execution_.throwIfCancelled();
+    }
+    for (const auto& keys : ofDepth) plan_.split(keys, GrowingTree::kNoLimit, execution_);
+    if (planning.plan.isCutShort()) stopped_ = budgetText();
 }
 
 // Builds the tree of the leaves that stand now, keeps the samples there are and takes the missing ones.
@@ -331,8 +350,7 @@ bool ErrorRefinement::refine() {
     for (const PlannedBrick* leaf : leaves_) worstRatio_ = std::max(worstRatio_, leaf->ratio);
     bool done = false;
     while (!keys.empty() && !(done = plan_.split(keys, budgetLeaves_, execution_))) {
-        stopped_ =
-            "the bound on voxels (" + std::to_string(std::int64_t(budgetLeaves_) * brickPoints()) + ")";
+        stopped_ = budgetText();
         keys.resize(keys.size() / 2);
     }
     times_.planMs += timer.elapsedMs();
@@ -362,6 +380,7 @@ BrickResult ErrorRefinement::run() {
     Timer timer;
     if (options_.measure == ErrorMeasure::rms) addNodeWeights();
     takeSamples();
+    splitByWishes();
     times_.planMs += timer.elapsedMs();
     BrickResult result;
     std::string exceeded;
@@ -427,7 +446,7 @@ std::string exceededBound(const TetMesh& mesh, std::span<const int> fields, cons
 BrickResult refineAndResample(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
                               const RefineOptions& options, const Execution& execution) {
     Timer timer;
-    if (options.criterion == Criterion::error) {
+    if (options.criterion.has(Criterion::error)) {
         execution.report(Stage::planning, 0, 1);
         checkOptions(mesh, meshBounds(mesh, execution, builtIndex(options)), options);
         ErrorRefinement refinement(mesh, fields, resampler, options, execution);

@@ -11,7 +11,7 @@
 namespace tessera {
 
 struct RefineOptions {
-    Criterion criterion = Criterion::elementSize;
+    Criteria criterion = Criterion::elementSize;
     int brickCells = 16;  ///< 8, 16, 32 or 64
     int resolution = 0;   ///< lattice points along the longest axis of the bounds (the finest level); 0: not
                           ///< given. They run exactly from the bounds' minimum to their maximum
@@ -23,6 +23,7 @@ struct RefineOptions {
     ErrorMeasure measure = ErrorMeasure::max;
     std::vector<int>
         errorFields;  ///< indices into mesh.fields that the bound holds for; empty: all point fields chosen
+    std::vector<Focus> focus;  ///< focus: where bricks are to be fine
     std::int64_t maxVoxels =
         0;  ///< bound on stored points (leaves x B^3); 0: a default from the memory there is
     std::int64_t maxMemoryBytes = 0;   ///< bound on the samples' memory; 0: no bound of its own

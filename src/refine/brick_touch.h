@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "brick/depth.h"
+#include "brick/growing_tree.h"
+#include "brick/overlap.h"
+#include "refine/brick_plan.h"
+#include "tessera/mesh.h"
+
+namespace tessera {
+
+/// Keeps every brick with points that reading inside the frame's bounds can need.
+bool insideBounds(const DepthKey& key, const PlanFrame& frame);
+
+/// Bricks of a size whose touch boxes may meet a box in index space.
+BrickRange bricksMeeting(const Box3d& index, int brickCells);
+
+/// Bricks of a depth that may meet the mesh and the frame's bounds.
+BrickRange clippedRange(const PlanFrame& frame, Depth depth);
+
+/// A box that holds whatever counts as touching the brick, world units.
+Box3d boxAround(const DepthKey& key, const PlanFrame& frame);
+
+/// An element in index space of a depth.
+ElementOverlap overlapOf(const TetMesh& mesh, const PlanFrame& frame, std::int64_t element, Depth depth);
+
+/// The bricks of depth 0, among `all`, that an element can touch.
+BrickRange rootsMeeting(const ElementOverlap& element, const PlanFrame& frame, const BrickRange& all);
+
+/// @param roots what rootsMeeting() gave for the element; `root` is one of them.
+bool touchesRoot(const ElementOverlap& element, const BrickRange& roots, const Vec3i& root,
+                 const PlanFrame& frame);
+
+/// The eight children of a brick, and which of them an element touches.
+class BrickChildren {
+  public:
+    BrickChildren(const DepthKey& parent, const PlanFrame& frame);
+    const DepthKey& key(unsigned child) const { return keys_[child]; }
+    /// Those inside the frame's bounds.
+    ChildBits allowed() const { return allowed_; }
+    /// @param element one that touches the parent, in index space of the children's depth.
+    ChildBits touchedBy(const ElementOverlap& element) const;
+
+  private:
+    std::array<DepthKey, 8> keys_;
+    std::array<Box3d, 8> boxes_;
+    ChildBits allowed_ = 0;
+};
+
+/// Tells whether an element belongs to a brick as splits from its root down to it would find: it touches the
+/// root and then, depth by depth, the child on the way.
+class BrickPath {
+  public:
+    /// @param roots clippedRange(frame, Depth(0)). Mesh and frame must outlive it.
+    BrickPath(const TetMesh& mesh, const PlanFrame& frame, const BrickRange& roots, const DepthKey& key);
+    bool holds(std::int64_t element) const;
+
+  private:
+    const TetMesh& mesh_;
+    const PlanFrame& frame_;
+    BrickRange roots_;
+    DepthKey key_;
+    std::vector<BrickChildren> above_;  // of the bricks above, from the root on
+};
+
+}  // namespace tessera

@@ -1,0 +1,139 @@
+#include "refine/mesh_bricks.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <utility>
+
+#include "base/check.h"
+#include "refine/brick_touch.h"
+#include "refine/element_size.h"
+#include "refine/wishes.h"
+
+namespace tessera {
+
+namespace {
+
+bool meet(const Box3d& a, const Box3d& b) {
+    return a.min.x <= b.max.x && a.min.y <= b.max.y && a.min.z <= b.max.z && a.max.x >= b.min.x &&
+           a.max.y >= b.min.y && a.max.z >= b.min.z;
+}
+
+}  // namespace
+
+MeshBricks::MeshBricks(std::shared_ptr<const SharedElementIndex> index, const PlanFrame& frame,
+                       double samplesPerElement, const Execution& execution)
+    : shared_(std::move(index)),
+      index_(shared_->get(execution)),
+      mesh_(shared_->mesh()),
+      frame_(frame),
+      rootRange_(clippedRange(frame, Depth(0))),
+      samplesPerElement_(samplesPerElement) {
+    if (samplesPerElement > 0)
+        sizes_ = elementSizes(mesh_, frame.rootSpacingWorld, frame.boundsWorld, execution.withoutProgress());
+    findRoots();
+}
+
+void MeshBricks::findRoots() {
+    const BrickRange& all = rootRange_;
+    for (Vec3i root = all.min; root.z <= all.max.z; ++root.z)
+        for (root.y = all.min.y; root.y <= all.max.y; ++root.y)
+            for (root.x = all.min.x; root.x <= all.max.x; ++root.x) {
+                const DepthKey key{Depth(0), root};
+                if (!insideBounds(key, frame_)) continue;
+                const Box3d box = boxAround(key, frame_);
+                const BrickPath path(mesh_, frame_, all, key);
+                bool isThere = false;
+                index_.walk([&](const Box3d& near) { return !isThere && meet(near, box); },
+                            [&](std::int32_t e) { isThere = isThere || path.holds(e); });
+                if (!isThere) continue;
+                roots_.push_back(root);
+                bricks_.emplace_back().key = key;
+            }
+    rootNumbers_ = RootGrid<Number>(roots_);
+    for (std::size_t r = 0; r < roots_.size(); ++r) rootNumbers_.slot(roots_[r]) = Number(r) + 1;
+}
+
+std::optional<MeshBricks::Number> MeshBricks::find(const DepthKey& key) const {
+    Number number = rootNumbers_.at(ancestorKey(key, Depth(0)).index);
+    if (number-- == 0) return {};
+    for (Depth depth(1); depth <= key.depth; depth = depth + 1) {
+        const unsigned child = childNumber(ancestorKey(key, depth).index);
+        if (!(bricks_[number].children >> child & 1)) return {};
+        number = bricks_[number].firstChild + child;
+    }
+    return number;
+}
+
+// An element that touches a child shows that the child is there, so inside a mesh a few elements show all.
+void MeshBricks::findChildren(Number brick) {
+    const DepthKey key = bricks_[brick].key;
+    const BrickChildren children(key, frame_);
+    const BrickPath path(mesh_, frame_, rootRange_, key);
+    std::array<Box3d, 8> boxes;
+    for (unsigned c = 0; c < 8; ++c) boxes[c] = boxAround(children.key(c), frame_);
+    unsigned missing = children.allowed();
+    ChildBits there = 0;
+    const auto mayShow = [&](const Box3d& near) {
+        for (unsigned bits = missing; bits != 0; bits &= bits - 1)
+            if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
+        return false;
+    };
+    index_.walk(mayShow, [&](std::int32_t e) {
+        const ChildBits touched = children.touchedBy(overlapOf(mesh_, frame_, e, key.depth + 1));
+        if ((touched & missing) == 0 || !path.holds(e)) return;
+        there = ChildBits(there | touched);
+        missing &= ~unsigned(touched);
+    });
+    const std::size_t first = bricks_.size();
+    TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
+    bricks_.resize(first + 8);
+    for (unsigned c = 0; c < 8; ++c) bricks_[first + c].key = children.key(c);
+    bricks_[brick].firstChild = Number(first);
+    bricks_[brick].children = there;
+}
+
+ChildBits MeshBricks::children(Number brick) {
+    if (bricks_[brick].firstChild == 0) findChildren(brick);
+    return bricks_[brick].children;
+}
+
+Box3d MeshBricks::boxWorld(Number brick) const {
+    const double edge = spacingWorld(brick) * frame_.brickCells;
+    const Vec3d low = frame_.originWorld + Vec3d(key(brick).index) * edge;
+    Box3d box{glm::max(low, frame_.meshBoundsWorld.min), glm::min(low + edge, frame_.meshBoundsWorld.max)};
+    if (frame_.boundsWorld) {
+        box.min = glm::max(box.min, frame_.boundsWorld->min);
+        box.max = glm::min(box.max, frame_.boundsWorld->max);
+    }
+    // A brick beside the bounds is there for its points on their border.
+    box.max = glm::max(box.min, box.max);
+    return box;
+}
+
+std::int64_t MeshBricks::elementsNear(Number brick) {
+    std::int32_t& count = bricks_[brick].elementsNear;
+    if (count < 0) count = std::int32_t(index_.count(boxAround(key(brick), frame_)));
+    return count;
+}
+
+double MeshBricks::wishedByElementSize(Number brick) {
+    if (samplesPerElement_ <= 0) return kNoWish;
+    float& wished = bricks_[brick].wishedByElementSize;
+    if (wished >= 0) return double(wished) * frame_.rootSpacingWorld / samplesPerElement_;
+    found_.clear();
+    foundSizes_.clear();
+    index_.query(boxAround(key(brick), frame_), found_);
+    const BrickPath path(mesh_, frame_, rootRange_, key(brick));
+    for (const std::int32_t e : found_)
+        if (sizes_[std::size_t(e)] > 0 && path.holds(e)) foundSizes_.push_back(sizes_[std::size_t(e)]);
+    wished = std::numeric_limits<float>::infinity();
+    if (!foundSizes_.empty()) {
+        const auto decides = foundSizes_.begin() + mostTooSmall(std::int64_t(foundSizes_.size()));
+        std::nth_element(foundSizes_.begin(), decides, foundSizes_.end());
+        wished = *decides;
+    }
+    return wishedByElementSize(brick);
+}
+
+}  // namespace tessera

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "brick/depth.h"
+#include "brick/growing_tree.h"
+#include "brick/root_grid.h"
+#include "mesh/element_index.h"
+#include "refine/brick_plan.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+
+namespace tessera {
+
+/// What a mesh holds in the bricks of a frame, found out brick by brick as it is asked for and then kept:
+/// which bricks there are, how many elements lie near one, and how small they are. Bricks are the ones that
+/// BrickPlan would make, by the element index instead of lists, so a brick costs microseconds.
+class MeshBricks {
+  public:
+    /// A brick's number; children are found by those of their parent.
+    using Number = std::uint32_t;
+
+    /// Builds the index if it isn't there, and with `samplesPerElement` passes over the mesh for the sizes of
+    /// its elements. The index and its mesh must outlive it. @param samplesPerElement what
+    /// RefineOptions::samplesPerElement says; 0: element sizes aren't wanted.
+    MeshBricks(std::shared_ptr<const SharedElementIndex> index, const PlanFrame& frame,
+               double samplesPerElement, const Execution& execution);
+
+    const PlanFrame& frame() const { return frame_; }
+    /// Bricks of depth 0, ascending by z, y, x: numbers 0, 1, ...
+    std::span<const Vec3i> roots() const { return roots_; }
+    /// A brick that was looked at, as all the leaves of a plan were.
+    std::optional<Number> find(const DepthKey& key) const;
+    const DepthKey& key(Number brick) const { return bricks_[brick].key; }
+    /// The closed box of the brick, within the mesh's bounds and those of the frame; world units.
+    Box3d boxWorld(Number brick) const;
+    double spacingWorld(Number brick) const { return frame_.spacingWorld(key(brick).depth); }
+
+    /// Which children there are.
+    ChildBits children(Number brick);
+    /// One of the children that there are.
+    Number child(Number brick, unsigned child) const { return bricks_[brick].firstChild + child; }
+
+    /// Elements near the brick, or a few more.
+    std::int64_t elementsNear(Number brick);
+    /// The spacing that the sizes of the brick's elements ask for: all but a small share of them have
+    /// samplesPerElement lattice points along their edges. World units; kNoWish when sizes aren't wanted.
+    double wishedByElementSize(Number brick);
+
+  private:
+    struct Brick {
+        DepthKey key;
+        Number firstChild = 0;  ///< 0: not looked for yet
+        ChildBits children = 0;
+        std::int32_t elementsNear = -1;  ///< -1: not counted yet
+        float wishedByElementSize = -1;  ///< -1: not looked for yet
+    };
+
+    void findRoots();
+    void findChildren(Number brick);
+
+    std::shared_ptr<const SharedElementIndex> shared_;
+    const ElementIndex& index_;
+    const TetMesh& mesh_;
+    PlanFrame frame_;
+    BrickRange rootRange_;
+    double samplesPerElement_;
+    std::vector<float> sizes_;  ///< in units of the root spacing
+    std::vector<Vec3i> roots_;
+    RootGrid<Number> rootNumbers_;  ///< one more than the root's number; 0: no root
+    std::vector<Brick> bricks_;     ///< the roots, then eight places for the children of each brick looked at
+    std::vector<std::int32_t> found_;
+    std::vector<float> foundSizes_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "brick/growing_tree.h"
+#include "refine/mesh_bricks.h"
+#include "tessera/focus.h"
+
+namespace tessera {
+
+/// What bricks are to be refined by; the sizes of elements besides, where MeshBricks has them. The finest of
+/// all wishes counts.
+struct Wishes {
+    std::vector<Focus> focus;
+    /// h_0, world units.
+    double finestSpacingWorld = 0;
+};
+
+/// How many bricks a plan may have.
+struct PlanLimit {
+    enum class Counts {
+        leaves,
+        /// Leaves and the bricks above them, which a program keeps to go back to.
+        all
+    };
+    Counts counts = Counts::leaves;
+    std::size_t bricks = GrowingTree::kNoLimit;
+};
+
+/// Makes a plan split by split, the best first: that with the greatest benefit for its cost. Benefit is how
+/// many points are wished for each that there is, 64 times as much in bricks that hold a focus; cost are the
+/// elements near the brick and the points of its children, with fixed weights. So the plan depends on the
+/// mesh, the wishes and the limit alone. It ends when no leaf wishes to be split, or with the first split
+/// that the limit doesn't allow. Without a limit its leaves are the coarsest balanced ones that fulfil the
+/// wishes.
+class WishPlan {
+  public:
+    /// One brick of the plan and its children. The plan is balanced after each; those that balance alone asks
+    /// for come before the one that needs them.
+    struct Split {
+        MeshBricks::Number brick = 0;
+        ChildBits children = 0;
+    };
+
+    /// @param bricks must outlive it. Throws InputError when the roots are more than the limit.
+    WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit);
+
+    /// Null when the plan is complete.
+    std::optional<Split> next();
+    /// All that is left. Throws Cancelled.
+    void complete(const Execution& execution = {});
+
+    /// What next() has given so far, and perhaps a few splits more.
+    const GrowingTree& tree() const { return tree_; }
+    const Wishes& wishes() const { return wishes_; }
+    /// Some leaf wishes to be split, and the limit doesn't allow it.
+    bool isCutShort() const { return isCutShort_; }
+    /// The finest spacing wished for in a brick, world units; kNoWish without any.
+    double wishedSpacing(MeshBricks::Number brick) const;
+    /// Benefit for cost of splitting a brick, whether it is a leaf or not; 0 where none is wished.
+    double valueOfSplit(MeshBricks::Number brick) const;
+
+  private:
+    struct Candidate {
+        double value = 0;
+        MeshBricks::Number brick = 0;
+        DepthKey key;
+        /// A better one comes first in a heap.
+        friend bool operator<(const Candidate& a, const Candidate& b) {
+            return a.value != b.value ? a.value < b.value : inStorageOrder(b.key, a.key);
+        }
+    };
+
+    void consider(MeshBricks::Number brick);
+    bool split(const DepthKey& key);
+
+    MeshBricks& bricks_;
+    Wishes wishes_;
+    PlanLimit limit_;
+    GrowingTree tree_;
+    std::vector<MeshBricks::Number> numberOfSlot_;
+    std::vector<Candidate> candidates_;  ///< a heap
+    std::vector<Split> made_;            ///< to be given out, the next one last
+    std::size_t splitCount_ = 0;
+    bool isCutShort_ = false;
+};
+
+}  // namespace tessera

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "tessera/focus.h"
+#include "tessera/vec.h"
+
+namespace tessera {
+
+inline constexpr double kNoWish = std::numeric_limits<double>::infinity();
+
+/// The finest spacing that focuses wish for somewhere in a closed box, world units; kNoWish without any.
+double wishedByFocus(std::span<const Focus> focus, double finestSpacingWorld, const Box3d& boxWorld);
+
+/// Whether a place where a focus stands lies in the box.
+bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld);
+
+/// Whether bricks wish to be split: whether their spacing is coarser than the one wished for, and not by
+/// rounding alone.
+inline bool isTooCoarse(double spacingWorld, double wishedWorld) {
+    return spacingWorld > wishedWorld * (1 + 1e-9);
+}
+
+/// How much splitting a brick gives: points wished for, for each that there is.
+inline double benefitOfSplit(double spacingWorld, double wishedWorld) {
+    const double ratio = spacingWorld / wishedWorld;
+    return ratio * ratio * ratio;
+}
+
+/// Throws InputError for numbers that aren't finite, an empty box or a radius that isn't positive.
+void checkFocus(std::span<const Focus> focus);
+
+/// Whether bricks around `b` would differ so little from those around `a` that they aren't worth their time:
+/// the same number of places, each moved by less than two finest spacings and a sixteenth of its radius, with
+/// radii that differ by less than a sixteenth, and the same half-spaces but for as much.
+bool isJitter(std::span<const Focus> a, std::span<const Focus> b, double finestSpacingWorld);
+
+}  // namespace tessera

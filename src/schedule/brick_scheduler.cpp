@@ -1,0 +1,333 @@
+#include "schedule/brick_scheduler.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/check.h"
+#include "refine/plan_frame.h"
+#include "refine/wishes.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+/// Bricks of the largest single change: so much of the budget isn't planned for, or nothing could be sampled
+/// beside what is shown.
+constexpr std::size_t kLargestChange = 8;
+
+PlanFrame frameOf(const TetMesh& mesh, const ScheduleOptions& options, const ElementIndex& index) {
+    const RefineOptions& refine = options.refine;
+    const Box3d& box = index.boundsWorld();
+    RefineOptions withFocus = refine;
+    if (withFocus.focus.empty()) withFocus.focus.push_back(pointFocus(box.min, 1));
+    checkOptions(mesh, box, withFocus);
+    if (refine.criterion.has(Criterion::error) || refine.criterion.has(Criterion::uniform))
+        throw InputError("a scheduler refines by element size, by a focus, or both, not by " +
+                         nameOf(refine.criterion));
+    return chooseFrame(box, refine);
+}
+
+std::int64_t bytesOfBrick(const TetMesh& mesh, std::span<const int> fields, int cells) {
+    std::int64_t channels = 0;
+    for (const int f : fields) channels += mesh.fields.at(std::size_t(f)).components;
+    const std::int64_t edge = cells + 1;
+    return edge * edge * edge * (std::int64_t(sizeof(float)) * channels + 1);
+}
+
+BindOptions bindOptions(const ScheduleOptions& options, std::shared_ptr<const SharedElementIndex> index) {
+    BindOptions bind = options.refine.bind;
+    bind.route = Route::index;
+    bind.index = std::move(index);
+    return bind;
+}
+
+std::shared_ptr<const SharedElementIndex> indexOf(const TetMesh& mesh, const ScheduleOptions& options) {
+    if (options.refine.bind.index) return options.refine.bind.index;
+    return std::make_shared<const SharedElementIndex>(mesh);
+}
+
+std::vector<DepthKey> childrenOf(const DepthKey& key, ChildBits children) {
+    std::vector<DepthKey> keys;
+    for (unsigned bits = children; bits != 0; bits &= bits - 1)
+        keys.push_back(childKey(key, unsigned(std::countr_zero(bits))));
+    return keys;
+}
+
+}  // namespace
+
+BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
+                               const ScheduleOptions& options, BrickTarget& target,
+                               const Execution& execution)
+    : index_(indexOf(mesh, options)),
+      bound_(resampler.bind(mesh, fields, bindOptions(options, index_))),
+      bricks_(index_, frameOf(mesh, options, index_->get(execution)),
+              options.refine.criterion.has(Criterion::elementSize) ? options.refine.samplesPerElement : 0,
+              execution),
+      target_(target),
+      brickBytes_(bytesOfBrick(mesh, fields, options.refine.brickCells)),
+      budgetBytes_(options.budgetBytes),
+      wishes_{options.refine.focus, focusSpacing(index_->get().boundsWorld(), options.refine)},
+      sampling_(*bound_, index_, bricks_.frame()) {
+    replan();
+    beginRoots();
+}
+
+BrickScheduler::~BrickScheduler() = default;
+
+std::int64_t BrickScheduler::leastBudgetBytes() const {
+    return std::int64_t(bricks_.roots().size() + kLargestChange) * brickBytes_;
+}
+
+PlanLimit BrickScheduler::limit() const {
+    if (budgetBytes_ < leastBudgetBytes())
+        throw InputError("a budget of " + std::to_string(budgetBytes_) +
+                         " bytes is too small: the coarsest bricks and one change take " +
+                         std::to_string(leastBudgetBytes()));
+    return {PlanLimit::Counts::all, budgetBricks() - kLargestChange};
+}
+
+bool BrickScheduler::setFocus(std::vector<Focus> focus) {
+    checkFocus(focus);
+    if (isJitter(wishes_.focus, focus, wishes_.finestSpacingWorld)) return false;
+    wishes_.focus = std::move(focus);
+    replan();
+    return true;
+}
+
+void BrickScheduler::setBudget(std::int64_t budgetBytes) {
+    const std::int64_t before = std::exchange(budgetBytes_, budgetBytes);
+    try {
+        replan();
+    } catch (...) {
+        budgetBytes_ = before;
+        throw;
+    }
+    while (!makeRoom(0)) {
+        // What is being sampled takes the room.
+        TESSERA_CHECK(!changes_.empty() && changes_.back().split, "a budget holds less than was planned");
+        abandon(changes_.back());
+        changes_.pop_back();
+    }
+}
+
+void BrickScheduler::replan() {
+    plan_ = std::make_unique<WishPlan>(bricks_, wishes_, limit());
+    next_.reset();
+    hasRanked_ = isAtRest_ = false;
+    ++planNumber_;
+    // Orders are begun one after the other, so those that wait are the last.
+    while (!changes_.empty() && changes_.back().split && !BrickSampling::hasBegun(*changes_.back().order)) {
+        abandon(changes_.back());
+        changes_.pop_back();
+    }
+}
+
+void BrickScheduler::abandon(const Change& change) {
+    if (change.order) {
+        sampling_.drop(*change.order);
+        reserved_ -= change.missing;
+    }
+    for (const DepthKey& key : change.bricks)
+        if (memory_.contains(key)) memory_.release(key);
+}
+
+void BrickScheduler::beginRoots() {
+    Change roots;
+    std::vector<std::vector<DepthKey>> each;
+    for (const Vec3i& root : bricks_.roots()) {
+        roots.bricks.push_back({Depth(0), root});
+        each.push_back({roots.bricks.back()});
+    }
+    roots.missing = each.size();
+    reserved_ += each.size();
+    roots.order = sampling_.order(each);
+    changes_.push_back(std::move(roots));
+}
+
+// False when there is no room.
+bool BrickScheduler::beginChange(const WishPlan::Split& split) {
+    Change change;
+    change.split = bricks_.key(split.brick);
+    change.planNumber = planNumber_;
+    change.children = split.children;
+    change.bricks = childrenOf(*change.split, split.children);
+    // Two orders that wait for one brick would sample it twice.
+    std::vector<std::vector<DepthKey>> halves(2);
+    for (const DepthKey& key : change.bricks)
+        if (!memory_.contains(key)) halves[std::size_t(key.index.z & 1)].push_back(key);
+    const std::size_t missing = halves[0].size() + halves[1].size();
+    // What is there already must stay while room is made.
+    for (const DepthKey& key : change.bricks)
+        if (memory_.contains(key)) memory_.hold(key);
+    change.missing = missing;
+    if (!makeRoom(missing)) {
+        change.missing = 0;
+        abandon(change);
+        return false;
+    }
+    counts_.reused += std::int64_t(change.bricks.size() - missing);
+    reserved_ += missing;
+    change.order = sampling_.order(halves);
+    changes_.push_back(std::move(change));
+    return true;
+}
+
+// Takes changes from the plan until there are enough to keep all threads at work. False when the plan has no
+// more.
+bool BrickScheduler::fillQueue(Clock::time_point deadline) {
+    constexpr std::size_t kAtOnce = 4;
+    while (changes_.size() < kAtOnce && hasRoots_) {
+        if (!next_) next_ = plan_->next();
+        if (!next_) return false;
+        const DepthKey key = bricks_.key(next_->brick);
+        // An older plan's change will be shown, or prove to have lost what it stands on: then it is begun
+        // anew.
+        if (std::any_of(changes_.begin(), changes_.end(),
+                        [&](const Change& change) { return change.split == key; }))
+            return true;
+        if (!tree_.isSplit(key) && !beginChange(*next_)) return true;
+        next_.reset();
+        if (Clock::now() >= deadline) return true;
+    }
+    return true;
+}
+
+bool BrickScheduler::publishFinished() {
+    bool any = false;
+    while (!changes_.empty() && BrickSampling::isDone(*changes_.front().order)) {
+        Change change = std::move(changes_.front());
+        changes_.pop_front();
+        for (SampledBrick& brick : BrickSampling::take(*change.order)) {
+            memory_.add(brick.key, std::move(brick.samples));
+            ++counts_.sampled;
+        }
+        reserved_ -= change.missing;
+        show(change);
+        any = true;
+    }
+    return any;
+}
+
+void BrickScheduler::show(const Change& change) {
+    if (change.split) {
+        // An older plan's change may have lost what it stands on.
+        if (showSplit(change)) return;
+        TESSERA_CHECK(change.planNumber < planNumber_, "a plan's change can't be shown");
+        for (const DepthKey& key : change.bricks) memory_.release(key);
+        return;
+    }
+    tree_ = GrowingTree(bricks_.roots());
+    hasRoots_ = true;
+    const std::vector<GrowingLeaf> leaves = tree_.leaves();
+    publish(nullptr, {}, leaves);
+}
+
+bool BrickScheduler::showSplit(const Change& change) {
+    struct Unbalanced {};
+    if (!tree_.findLeaf(*change.split)) return false;
+    bool isFirst = true;
+    try {
+        tree_.split(*change.split, [&](std::span<const GrowingLeaf>, std::span<ChildBits> children) {
+            if (!std::exchange(isFirst, false)) throw Unbalanced{};
+            children[0] = change.children;
+        });
+    } catch (const Unbalanced&) {
+        return false;
+    }
+    splits_.insert(*change.split);
+    publish(&*change.split, tree_.change().removed, tree_.change().added);
+    return true;
+}
+
+// Tells the target what the tree has changed within a brick; without one, all is new.
+void BrickScheduler::publish(const DepthKey* within, std::span<const GrowingLeaf> removed,
+                             std::span<const GrowingLeaf> added) {
+    std::vector<ShownBrick> shown;
+    for (const GrowingLeaf& leaf : added) shown.push_back({leaf, memory_.find(leaf.key)});
+    std::vector<GrowingLeaf> bordering;
+    if (within) tree_.findNeighbours(*within, bordering);
+    ++counts_.published;
+    target_.publish({removed, shown, bordering});
+}
+
+// Drops bricks until there is room for so many more.
+bool BrickScheduler::makeRoom(std::size_t bricks) {
+    while (memory_.brickCount() + reserved_ + bricks > budgetBricks()) {
+        if (memory_.dropOldest())
+            ++counts_.dropped;
+        else if (!mergeLeastUseful())
+            return false;
+    }
+    return true;
+}
+
+// Merges a brick that the plan doesn't split, or not yet. False when there is none.
+bool BrickScheduler::mergeLeastUseful() {
+    for (int attempt = 0; attempt < 2; ++attempt) {
+        if (!hasRanked_) {
+            std::vector<std::pair<double, DepthKey>> ranked;
+            for (const DepthKey& key : splits_)
+                if (!plan_->tree().isSplit(key))
+                    ranked.emplace_back(plan_->valueOfSplit(*bricks_.find(key)), key);
+            std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) {
+                return a.first != b.first ? a.first > b.first : inStorageOrder(a.second, b.second);
+            });
+            leastUseful_.clear();
+            for (const auto& [value, key] : ranked) leastUseful_.push_back(key);
+            hasRanked_ = true;
+            attempt = 1;  // nothing new to rank afterwards
+        }
+        for (std::size_t i = leastUseful_.size(); i-- > 0;) {
+            const DepthKey key = leastUseful_[i];
+            if (plan_->tree().isSplit(key) || !merge(key)) continue;
+            leastUseful_.erase(leastUseful_.begin() + std::ptrdiff_t(i));
+            return true;
+        }
+        hasRanked_ = false;
+    }
+    return false;
+}
+
+bool BrickScheduler::merge(const DepthKey& key) {
+    if (!tree_.merge(key)) return false;
+    splits_.erase(key);
+    const TreeChange change = tree_.change();
+    publish(&key, change.removed, change.added);
+    for (const GrowingLeaf& leaf : change.removed) memory_.release(leaf.key);
+    return true;
+}
+
+bool BrickScheduler::update(Clock::time_point deadline, const Execution& execution) {
+    if (isAtRest_) return true;
+    publishFinished();
+    while (true) {
+        execution.throwIfCancelled();
+        const bool planGoesOn = fillQueue(deadline);
+        if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return isAtRest_ = true;
+        if (!changes_.empty() && !BrickSampling::isDone(*changes_.front().order))
+            sampling_.work(deadline, execution);
+        publishFinished();
+        if (Clock::now() >= deadline) return false;
+    }
+}
+
+void BrickScheduler::finish(const Execution& execution) {
+    while (!update(Clock::now() + std::chrono::hours(1), execution)) {
+    }
+}
+
+std::shared_ptr<const Block> BrickScheduler::samples(const DepthKey& key) const {
+    return tree_.findLeaf(key) || tree_.isSplit(key) ? memory_.find(key) : nullptr;
+}
+
+void BrickScheduler::forget() {
+    const std::size_t before = memory_.brickCount();
+    memory_.dropAll();
+    counts_.dropped += std::int64_t(before - memory_.brickCount());
+}
+
+}  // namespace tessera

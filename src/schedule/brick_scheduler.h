@@ -1,0 +1,147 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <span>
+#include <unordered_set>
+#include <vector>
+
+#include "brick/growing_tree.h"
+#include "refine/mesh_bricks.h"
+#include "refine/refine_options.h"
+#include "refine/wish_plan.h"
+#include "schedule/brick_memory.h"
+#include "schedule/brick_sampling.h"
+#include "schedule/brick_target.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+#include "tessera/resampler.h"
+
+namespace tessera {
+
+/// How a scheduler samples; it keeps this as long as it lives.
+struct ScheduleOptions {
+    /// Element size, focus or both; lattice, finest spacing and bounds as for planBricks(). The first focus
+    /// may be given later.
+    RefineOptions refine;
+    /// Of all bricks in memory, shown, kept for later or being sampled.
+    std::int64_t budgetBytes = std::int64_t(1) << 30;
+};
+
+/// What a scheduler has done so far.
+struct ScheduleCounts {
+    std::int64_t sampled = 0;    ///< bricks
+    std::int64_t reused = 0;     ///< bricks shown again from memory
+    std::int64_t dropped = 0;    ///< bricks dropped from memory
+    std::int64_t published = 0;  ///< changes shown
+};
+
+/// Keeps a mesh as bricks that are fine where they are wished to be: around a focus that moves, for one. It
+/// samples the best bricks first, within a budget of bytes, and shows whole, consistent states only: leaves
+/// cover the domain once, any two that touch differ by at most one depth, and each has all its samples. The
+/// coarsest bricks come first and never go.
+///
+/// Its work is done in update(), by as many threads as that is given; everything else is for the same thread.
+/// What it shows at rest depends on the mesh, the wishes and the budget alone: it is the plan that WishPlan
+/// makes.
+class BrickScheduler {
+  public:
+    using Clock = std::chrono::steady_clock;
+
+    /// Builds the element index, but samples nothing yet. The mesh, the resampler and the target must outlive
+    /// it. Throws InputError for options that contradict each other and a budget that doesn't hold the
+    /// coarsest bricks.
+    /// @param fields indices into mesh.fields: the channels, in this order.
+    BrickScheduler(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
+                   const ScheduleOptions& options, BrickTarget& target, const Execution& execution = {});
+    ~BrickScheduler();
+
+    /// Moves the focus: work that waits is dropped, bricks that are being sampled come to their end. False,
+    /// and nothing changes, where the difference is too small to be worth new bricks (isJitter()).
+    bool setFocus(std::vector<Focus> focus);
+    /// Drops bricks at once where there are more. Throws InputError when the coarsest don't fit.
+    void setBudget(std::int64_t budgetBytes);
+
+    /// Samples and publishes until the deadline has passed, a little at least, or there is nothing to do.
+    /// True at rest: what is shown is the plan. When it throws, what is shown stays consistent and the next
+    /// call goes on.
+    bool update(Clock::time_point deadline, const Execution& execution = {});
+    /// Until it is at rest.
+    void finish(const Execution& execution = {});
+
+    /// The leaves shown; none before the coarsest bricks are there.
+    const GrowingTree& tree() const { return tree_; }
+    /// Of a leaf shown, or of a brick above one; null for others.
+    std::shared_ptr<const Block> samples(const DepthKey& key) const;
+    const PlanFrame& frame() const { return bricks_.frame(); }
+    const Wishes& wishes() const { return wishes_; }
+    /// The budget holds fewer bricks than are wished for.
+    bool isCutShort() const { return plan_ && plan_->isCutShort(); }
+
+    /// Of bricks in memory and of those being sampled.
+    std::int64_t bytes() const { return std::int64_t(memory_.brickCount() + reserved_) * brickBytes_; }
+    std::int64_t brickBytes() const { return brickBytes_; }
+    /// The least budget: the coarsest bricks and one change.
+    std::int64_t leastBudgetBytes() const;
+    const ScheduleCounts& counts() const { return counts_; }
+    const ResampleStatistics& statistics() const { return sampling_.statistics(); }
+    /// Drops all bricks that aren't shown.
+    void forget();
+
+  private:
+    /// Bricks that are sampled, to be shown together.
+    struct Change {
+        std::optional<DepthKey> split;  ///< null: the roots
+        ChildBits children = 0;
+        std::vector<DepthKey> bricks;
+        std::shared_ptr<BrickSampling::Order> order;
+        std::size_t missing = 0;  ///< bricks that are being sampled
+        int planNumber = 0;
+    };
+
+    void replan();
+    void beginRoots();
+    bool beginChange(const WishPlan::Split& split);
+    bool fillQueue(Clock::time_point deadline);
+    void abandon(const Change& change);
+    bool publishFinished();
+    void show(const Change& change);
+    bool showSplit(const Change& change);
+    bool makeRoom(std::size_t bricks);
+    bool mergeLeastUseful();
+    bool merge(const DepthKey& key);
+    void publish(const DepthKey* within, std::span<const GrowingLeaf> removed,
+                 std::span<const GrowingLeaf> added);
+    std::size_t budgetBricks() const { return std::size_t(budgetBytes_ / brickBytes_); }
+    PlanLimit limit() const;
+
+    std::shared_ptr<const SharedElementIndex> index_;
+    std::unique_ptr<BoundResampler> bound_;
+    MeshBricks bricks_;
+    BrickTarget& target_;
+    std::int64_t brickBytes_;
+    std::int64_t budgetBytes_;
+    Wishes wishes_;
+
+    GrowingTree tree_;
+    bool hasRoots_ = false;  ///< the coarsest bricks are shown
+    BrickMemory memory_;     ///< holds leaves and the bricks above them, and what changes wait for
+    std::unordered_set<DepthKey, DepthKeyHash> splits_;  ///< bricks above leaves
+    std::unique_ptr<WishPlan> plan_;
+    int planNumber_ = 0;
+    bool isAtRest_ = false;
+    std::optional<WishPlan::Split> next_;  ///< of the plan, waiting for room
+    std::vector<DepthKey> leastUseful_;    ///< of splits_, the least useful last
+    bool hasRanked_ = false;
+
+    BrickSampling sampling_;
+    std::deque<Change> changes_;  ///< in the order in which they are shown
+    std::size_t reserved_ = 0;    ///< bricks being sampled
+    ScheduleCounts counts_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,275 @@
+#include "schedule/brick_scheduler.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <random>
+#include <set>
+
+#include "brick_test_meshes.h"
+#include "refine/plan_frame.h"
+#include "schedule/watched_bricks.h"
+#include "software/software_resampler.h"
+#include "tessera/error.h"
+
+namespace tessera {
+namespace {
+
+using Clock = BrickScheduler::Clock;
+
+TetMesh meshWithField(TetMesh mesh) {
+    addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(5 * p.x) + p.y * p.z; });
+    return mesh;
+}
+
+struct Bench {
+    explicit Bench(TetMesh made, ScheduleOptions with) : mesh(meshWithField(std::move(made))), options(with) {
+        BindOptions pass;
+        pass.route = Route::pass;
+        bound = resampler->bind(mesh, fields, pass);
+        frame = chooseFrame(mesh.boundsWorld(), options.refine);
+        target = std::make_unique<WatchedBricks>(*bound, frame);
+        scheduler = std::make_unique<BrickScheduler>(mesh, fields, *resampler, options, *target);
+        target->afterEach = [this] { expectWithinBudget(); };
+    }
+
+    void expectWithinBudget() const { EXPECT_LE(scheduler->bytes(), budget()); }
+    std::int64_t budget() const { return options.budgetBytes; }
+
+    /// The leaves shown are the tree's, disjoint and balanced.
+    void expectWhole() const {
+        const std::vector<GrowingLeaf> leaves = scheduler->tree().leaves();
+        ASSERT_EQ(leaves.size(), target->leaves.size());
+        for (const GrowingLeaf& leaf : leaves) {
+            const auto found = target->leaves.find(leaf.slot);
+            ASSERT_TRUE(found != target->leaves.end() && found->second.leaf == leaf);
+            for (int n = 0; n < 27; ++n) {
+                const DepthKey near{leaf.key.depth,
+                                    leaf.key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
+                const auto other = scheduler->tree().findCovering(near);
+                if (other) {
+                    ASSERT_LE(leaf.key.depth - other->key.depth, 1);
+                }
+            }
+        }
+    }
+
+    /// Lists of elements, an independent way to the bricks of a tree, give the same leaves: none is missing.
+    void expectDomainCovered() const {
+        if (scheduler->tree().leafCount() == 0) return;
+        BrickPlan plan(mesh, frame, {});
+        std::set<std::array<int, 4>> above;
+        const std::vector<GrowingLeaf> leaves = scheduler->tree().leaves();
+        for (const GrowingLeaf& leaf : leaves)
+            for (Depth d; d < leaf.key.depth; d = d + 1) {
+                const DepthKey key = ancestorKey(leaf.key, d);
+                above.insert({d.halvings(), key.index.x, key.index.y, key.index.z});
+            }
+        for (const auto& [d, x, y, z] : above) {
+            const DepthKey key{Depth(d), {x, y, z}};
+            const auto planned = plan.leaves();
+            if (std::any_of(planned.begin(), planned.end(),
+                            [&](const PlannedBrick* b) { return b->key == key; }))
+                plan.split({&key, 1}, GrowingTree::kNoLimit, {});
+        }
+        // A brick vanishes when it is split and none of its children holds elements.
+        std::vector<DepthKey> vanished;
+        for (const PlannedBrick* brick : plan.leaves())
+            if (!scheduler->tree().findLeaf(brick->key)) vanished.push_back(brick->key);
+        for (const DepthKey& key : vanished) {
+            const std::size_t before = plan.leafCount();
+            plan.split({&key, 1}, GrowingTree::kNoLimit, {});
+            ASSERT_EQ(plan.leafCount(), before - 1) << "a brick is missing";
+        }
+        ASSERT_EQ(plan.leafCount(), leaves.size());
+    }
+
+    /// At rest the leaves are those of a plan made anew.
+    void expectPlan(std::int64_t budgetBytes) const {
+        const auto index = std::make_shared<const SharedElementIndex>(mesh);
+        const bool bySize = options.refine.criterion.has(Criterion::elementSize);
+        MeshBricks bricks(index, frame, bySize ? options.refine.samplesPerElement : 0, {});
+        const std::size_t most = std::size_t(budgetBytes / scheduler->brickBytes()) - 8;
+        WishPlan plan(bricks, scheduler->wishes(), {PlanLimit::Counts::all, most});
+        plan.complete();
+        const auto shown = scheduler->tree().leaves(), planned = plan.tree().leaves();
+        ASSERT_EQ(shown.size(), planned.size());
+        for (std::size_t i = 0; i < shown.size(); ++i) ASSERT_EQ(shown[i].key, planned[i].key);
+        EXPECT_EQ(scheduler->isCutShort(), plan.isCutShort());
+    }
+
+    TetMesh mesh;
+    std::vector<int> fields{0};
+    ScheduleOptions options;
+    std::unique_ptr<Resampler> resampler = std::make_unique<SoftwareResampler>();
+    std::unique_ptr<BoundResampler> bound;
+    PlanFrame frame;
+    std::unique_ptr<WatchedBricks> target;
+    std::unique_ptr<BrickScheduler> scheduler;
+};
+
+ScheduleOptions optionsFor(Criteria criteria, std::int64_t bricks) {
+    ScheduleOptions options;
+    options.refine.criterion = criteria;
+    options.refine.brickCells = 8;
+    options.refine.resolution = 200;
+    options.refine.focus = {pointFocus({0.3, 0.2, 0.1}, 0.1)};
+    options.budgetBytes = bricks * 9 * 9 * 9 * 5;
+    return options;
+}
+
+TEST(Schedule, AtRestShowsThePlan) {
+    for (const Criteria criteria : {Criteria(Criterion::focus), Criteria(Criterion::elementSize),
+                                    Criterion::elementSize | Criterion::focus}) {
+        Bench bench(ballMesh(8, 1), optionsFor(criteria, 100'000));
+        EXPECT_EQ(bench.scheduler->tree().leafCount(), 0u);
+        bench.scheduler->finish({.threads = 2});
+        bench.expectWhole();
+        bench.expectDomainCovered();
+        bench.expectPlan(bench.budget());
+        EXPECT_FALSE(bench.scheduler->isCutShort());
+        EXPECT_EQ(bench.scheduler->counts().dropped, 0);
+        EXPECT_TRUE(bench.scheduler->update(Clock::now()));
+        const std::int64_t sampled = bench.scheduler->counts().sampled;
+        EXPECT_EQ(bench.scheduler->bytes(), sampled * bench.scheduler->brickBytes());
+    }
+}
+
+TEST(Schedule, CoarseBricksComeFirstAndAtOnce) {
+    Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 100'000));
+    std::vector<std::size_t> sizes;
+    bench.target->afterEach = [&] { sizes.push_back(bench.target->leaves.size()); };
+    while (!bench.scheduler->update(Clock::now())) {
+    }
+    const auto index = std::make_shared<const SharedElementIndex>(bench.mesh);
+    EXPECT_EQ(sizes.front(), MeshBricks(index, bench.frame, 0, {}).roots().size());
+    EXPECT_GT(sizes.size(), 10u);
+}
+
+TEST(Schedule, JitterMovesNothing) {
+    Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 2'000));
+    bench.scheduler->finish();
+    const ScheduleCounts before = bench.scheduler->counts();
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> voxel(-2.0 / 199, 2.0 / 199);
+    for (int frame = 0; frame < 1000; ++frame) {
+        const Vec3d moved =
+            Vec3d(0.3, 0.2, 0.1) + Vec3d(voxel(random), voxel(random), voxel(random)) / std::sqrt(3.0);
+        EXPECT_FALSE(bench.scheduler->setFocus({pointFocus(moved, 0.1)}));
+        EXPECT_TRUE(bench.scheduler->update(Clock::now()));
+    }
+    EXPECT_EQ(bench.scheduler->counts().sampled, before.sampled);
+    EXPECT_EQ(bench.scheduler->counts().dropped, before.dropped);
+    EXPECT_EQ(bench.scheduler->counts().published, before.published);
+}
+
+TEST(Schedule, ComingBackSamplesNothing) {
+    Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 100'000));
+    bench.scheduler->finish();
+    bench.scheduler->setFocus({pointFocus({-0.5, -0.4, 0.2}, 0.1)});
+    bench.scheduler->finish();
+    bench.expectPlan(bench.budget());
+    const std::int64_t sampled = bench.scheduler->counts().sampled;
+    EXPECT_TRUE(bench.scheduler->setFocus({pointFocus({0.3, 0.2, 0.1}, 0.1)}));
+    bench.scheduler->finish();
+    EXPECT_EQ(bench.scheduler->counts().sampled, sampled);
+    EXPECT_GT(bench.scheduler->counts().reused, 0);
+    bench.expectPlan(bench.budget());
+    bench.scheduler->forget();
+    bench.scheduler->setFocus({pointFocus({-0.5, -0.4, 0.2}, 0.1)});
+    bench.scheduler->finish();
+    EXPECT_GT(bench.scheduler->counts().sampled, sampled);
+}
+
+TEST(Schedule, RefusesWhatItCannotKeep) {
+    EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::focus, 4)), InputError);
+    EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::error, 1000)), InputError);
+    Bench bench(ballMesh(4, 1), optionsFor(Criterion::focus, 1000));
+    EXPECT_THROW(bench.scheduler->setBudget(100), InputError);
+    EXPECT_THROW(bench.scheduler->setFocus({pointFocus(Vec3d(0), -1)}), InputError);
+    bench.scheduler->finish();
+    bench.expectPlan(bench.budget());
+}
+
+// Focus jumps and jitter, changes of the budget, cancelled calls and updates of any length, with threads or
+// without.
+void runAtRandom(unsigned seed, int steps, int& cutShort) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    std::mt19937 random(seed);
+    const auto share = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
+    const Criteria criteria =
+        seed % 3 == 0 ? Criterion::elementSize | Criterion::focus : Criteria(Criterion::focus);
+    ScheduleOptions options = optionsFor(criteria, 400 + std::int64_t(600 * share()));
+    options.refine.resolution = seed % 2 == 0 ? 0 : 150;
+    if (seed % 5 == 4) options.refine.boundsWorld = Box3d{Vec3d(-0.4, -0.7, 0), Vec3d(0.5, 0.8, 0.9)};
+    Bench bench(seed % 2 == 0 ? gradedMesh(6, 2) : ballMesh(6, 1), options);
+    BrickScheduler& scheduler = *bench.scheduler;
+    const Box3d bounds = bench.mesh.boundsWorld();
+    std::atomic<bool> cancel{false};
+    for (int step = 0; step < steps && !testing::Test::HasFailure(); ++step) {
+        const double what = share();
+        if (what < 0.06) {
+            std::vector<Focus> focus;
+            for (int n = 0; n < 1 + int(2 * share() * share()); ++n) {
+                const Vec3d at = glm::mix(bounds.min, bounds.max, Vec3d(share(), share(), share()));
+                focus.push_back(pointFocus(at, 0.02 + 0.2 * share() * share()));
+            }
+            scheduler.setFocus(focus);
+        } else if (what < 0.12) {
+            std::vector<Focus> focus = scheduler.wishes().focus;
+            for (Focus& one : focus) {
+                const Vec3d by = scheduler.wishes().finestSpacingWorld * Vec3d(share(), share(), share());
+                one.boxWorld.min += by, one.boxWorld.max += by;
+            }
+            EXPECT_FALSE(scheduler.setFocus(focus));
+        } else if (what < 0.14) {
+            const std::int64_t bytes =
+                scheduler.leastBudgetBytes() + std::int64_t(900 * share() * share()) * scheduler.brickBytes();
+            // While it shrinks what is shown still has the bytes that it had.
+            bench.options.budgetBytes = std::max(bench.options.budgetBytes, bytes);
+            scheduler.setBudget(bytes);
+            bench.options.budgetBytes = bytes;
+        } else if (what < 0.16) {
+            scheduler.forget();
+        } else if (what < 0.2) {
+            cancel = true;
+            const auto soon = Clock::now() + std::chrono::milliseconds(1);
+            try {
+                EXPECT_TRUE(scheduler.update(soon, {.threads = 1, .cancel = &cancel})) << "not cancelled";
+            } catch (const Cancelled&) {
+            }
+            cancel = false;
+            continue;
+        }
+        const int threads = share() < 0.2 ? 3 : 1;
+        const auto deadline = Clock::now() + std::chrono::microseconds(int(2000 * share() * share()));
+        scheduler.update(deadline, {.threads = threads});
+        bench.expectWithinBudget();
+        bench.expectWhole();
+        if (step % 100 == 99) {
+            bench.expectDomainCovered();
+            scheduler.finish();
+            bench.expectWhole();
+            bench.expectDomainCovered();
+            bench.expectPlan(bench.budget());
+            cutShort += scheduler.isCutShort();
+        }
+    }
+    EXPECT_GT(scheduler.counts().dropped, 0);
+    EXPECT_GT(scheduler.counts().reused, 0);
+}
+
+// TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
+TEST(Schedule, EveryPublishedStateIsWhole) {
+    const auto number = [](const char* name, int otherwise) {
+        const char* text = std::getenv(name);
+        return text ? std::atoi(text) : otherwise;
+    };
+    const int seeds = number("TESSERA_SCHEDULE_SEEDS", 3), steps = number("TESSERA_SCHEDULE_STEPS", 300);
+    int cutShort = 0;
+    for (int seed = 0; seed < seeds && !HasFailure(); ++seed) runAtRandom(unsigned(seed), steps, cutShort);
+    EXPECT_GT(cutShort, 0);
+}
+
+}  // namespace
+}  // namespace tessera
