@@ -53,6 +53,7 @@ int Arguments::run(int count, char** words, const std::function<int()>& program)
 }
 
 template void Arguments::add(const std::string&, std::string&, const std::string&);
+template void Arguments::add(const std::string&, double&, const std::string&);
 template void Arguments::add(const std::string&, int&, const std::string&);
 template void Arguments::add(const std::string&, bool&, const std::string&);
 template void Arguments::add(const std::string&, std::int64_t&, const std::string&);

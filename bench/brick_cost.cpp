@@ -20,10 +20,10 @@
 #include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
+#include "graded_box.h"
 #include "mesh/element_index.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
-#include "reference/generators.h"
 #include "reference/random.h"
 #include "resample/statistic_names.h"
 #include "resample/stoppable_sampling.h"
@@ -38,6 +38,7 @@ using tessera::Box3d;
 using tessera::TetMesh;
 using tessera::Vec3d;
 using tessera::Vec3i;
+using tessera::bench::gradedBox;
 
 struct Options {
     std::vector<std::string> meshPaths;
@@ -46,18 +47,6 @@ struct Options {
     std::vector<std::string> bricks{"16:30", "16:100", "16:300", "16:1000", "64:3000", "64:10000"};
     int count = 200, threads = 1, indexThreads = 2;
 };
-
-/// A jittered box whose cells grow from a corner: sizes differ tenfold along each axis.
-TetMesh gradedBox(std::int64_t elements) {
-    const int cells = std::max(2, int(std::lround(std::cbrt(double(elements) / 6))));
-    TetMesh mesh = tessera::boxMesh({.cells = Vec3i(cells), .jitter = 0.2});
-    for (Vec3d& p : mesh.points)
-        for (int a = 0; a < 3; ++a) p[a] = (std::exp(2.3 * p[a]) - 1) / 9;
-    tessera::Field field{"f", tessera::FieldLocation::point, 1, {}};
-    for (const Vec3d& p : mesh.points) field.values.push_back(std::sin(7 * p.x) + p.y * p.z);
-    mesh.fields.push_back(std::move(field));
-    return mesh;
-}
 
 struct Brick {
     tessera::Lattice lattice;

@@ -384,17 +384,21 @@ void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box
     }
 }
 
-std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const MappedBox& box) const {
+std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const MappedBox& box,
+                                 std::size_t smallest) const {
     const Node& node = levels_[level][std::size_t(n)];
     std::int64_t sum = 0;
     const Meetings<kWidth> meeting(node, box);
     for (std::size_t c = 0; c < kWidth; ++c) {
         if (!meeting.meets[c]) continue;
         const std::int64_t below = n * kWidth + std::int64_t(c);
+        const auto all = std::int64_t(elementsBelow(level, below).size());
         if (meeting.isInside[c])
-            sum += std::int64_t(elementsBelow(level, below).size());
+            sum += all;
+        else if (std::size_t(all) <= smallest)
+            sum += (all + 1) / 2;
         else if (level > 0)
-            sum += count(level - 1, below, box);
+            sum += count(level - 1, below, box, smallest);
         else
             sum += std::popcount(metInGroup(groups_[std::size_t(below)], stepsWithin(box, child(node, c)),
                                             elementsBelow(level, below).size()));
@@ -412,7 +416,16 @@ void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& eleme
 
 std::int64_t ElementIndex::count(const Box3d& boxWorld) const {
     MappedBox box;
-    return clip(boxWorld, box) ? count(levels_.size() - 1, 0, box) : 0;
+    return clip(boxWorld, box) ? count(levels_.size() - 1, 0, box, 0) : 0;
+}
+
+std::int64_t ElementIndex::countAbout(const Box3d& boxWorld) const {
+    constexpr std::size_t kSmallest = 512;
+    constexpr std::int64_t kMany = 8 * kSmallest;
+    MappedBox box;
+    if (!clip(boxWorld, box)) return 0;
+    const std::int64_t about = count(levels_.size() - 1, 0, box, kSmallest);
+    return about >= kMany ? about : count(levels_.size() - 1, 0, box, 0);
 }
 
 const ElementIndex& SharedElementIndex::get(const Execution& execution) const {

@@ -38,6 +38,9 @@ class ElementIndex {
     /// How many elements query() finds, or a few more: microseconds, whatever the box holds.
     std::int64_t count(const Box3d& boxWorld) const;
 
+    /// The same to within a fifth or so where there are thousands: faster for boxes that cut many elements.
+    std::int64_t countAbout(const Box3d& boxWorld) const;
+
     /// Calls visit(element) for every element whose box, perhaps a little enlarged, passes meets(boxWorld),
     /// in no order. `meets` must hold for a box that holds another one for which it holds. Gives the number
     /// of elements whose boxes were looked at.
@@ -78,7 +81,9 @@ class ElementIndex {
     bool clip(const Box3d& boxWorld, MappedBox& box) const;
     void query(std::size_t level, std::int64_t node, const MappedBox& box, std::size_t most,
                std::vector<std::int32_t>& elements) const;
-    std::int64_t count(std::size_t level, std::int64_t node, const MappedBox& box) const;
+    /// @param smallest subtrees of no more elements that meet the box in part count by half; 0: none do.
+    std::int64_t count(std::size_t level, std::int64_t node, const MappedBox& box,
+                       std::size_t smallest) const;
 
     template <class Meets, class Visit>
     void walk(std::size_t level, std::int64_t n, const Meets& meets, const Visit& visit,

@@ -65,7 +65,7 @@ std::optional<MeshBricks::Number> MeshBricks::find(const DepthKey& key) const {
     return number;
 }
 
-// An element that touches a child shows that the child is there, so inside a mesh a few elements show all.
+// An element that touches a child shows that the child is there: a few elements show all inside a mesh.
 void MeshBricks::findChildren(Number brick) {
     const DepthKey key = bricks_[brick].key;
     const BrickChildren children(key, frame_);
@@ -79,12 +79,22 @@ void MeshBricks::findChildren(Number brick) {
             if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
         return false;
     };
-    index_.walk(mayShow, [&](std::int32_t e) {
+    const auto show = [&](std::int32_t e) {
         const ChildBits touched = children.touchedBy(overlapOf(mesh_, frame_, e, key.depth + 1));
         if ((touched & missing) == 0 || !path.holds(e)) return;
         there = ChildBits(there | touched);
         missing &= ~unsigned(touched);
-    });
+    };
+    // Those around the middle of a child come first: they are few, and mostly enough.
+    for (unsigned c = 0; c < 8; ++c) {
+        if (!(missing >> c & 1)) continue;
+        const Vec3d middle = (boxes[c].min + boxes[c].max) * 0.5;
+        found_.clear();
+        index_.query({middle, middle}, found_);
+        for (const std::int32_t e : found_)
+            if (missing >> c & 1) show(e);
+    }
+    if (missing != 0) index_.walk(mayShow, show);
     const std::size_t first = bricks_.size();
     TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
     bricks_.resize(first + 8);
@@ -113,7 +123,7 @@ Box3d MeshBricks::boxWorld(Number brick) const {
 
 std::int64_t MeshBricks::elementsNear(Number brick) {
     std::int32_t& count = bricks_[brick].elementsNear;
-    if (count < 0) count = std::int32_t(index_.count(boxAround(key(brick), frame_)));
+    if (count < 0) count = std::int32_t(index_.countAbout(boxAround(key(brick), frame_)));
     return count;
 }
 

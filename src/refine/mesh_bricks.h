@@ -46,7 +46,7 @@ class MeshBricks {
     /// One of the children that there are.
     Number child(Number brick, unsigned child) const { return bricks_[brick].firstChild + child; }
 
-    /// Elements near the brick, or a few more.
+    /// About how many elements lie near the brick.
     std::int64_t elementsNear(Number brick);
     /// The spacing that the sizes of the brick's elements ask for: all but a small share of them have
     /// samplesPerElement lattice points along their edges. World units; kNoWish when sizes aren't wanted.

@@ -10,8 +10,7 @@ namespace tessera {
 
 namespace {
 
-/// A piece with no more elements near it, or no more points, isn't cut.
-constexpr std::int64_t kPieceElements = 1024;
+/// A piece with no more points isn't cut for them.
 constexpr std::int64_t kPiecePoints = 32 * 32 * 32;
 
 }  // namespace
@@ -27,13 +26,13 @@ StoppableSampling::StoppableSampling(BoundResampler& bound, std::shared_ptr<cons
 }
 
 // Cuts the next piece until few elements are near it.
-void StoppableSampling::cutNext(const ElementIndex& index) {
+void StoppableSampling::cutNext(const ElementIndex& index, std::int64_t elements) {
     while (true) {
         const IndexBox piece = pieces_.back();
         const Vec3i size = piece.size();
         const int longest = std::max({size.x, size.y, size.z});
         if (longest <= 1 || (piece.count() <= kPiecePoints &&
-                             index.count(boundsWorld(lattice_, piece, kNearMarginVoxels)) <= kPieceElements))
+                             index.count(boundsWorld(lattice_, piece, kNearMarginVoxels)) <= elements))
             return;
         // Memory runs along x.
         const int axis = size.z == longest ? 2 : size.y == longest ? 1 : 0;
@@ -70,20 +69,24 @@ void StoppableSampling::copy(const Block& piece) {
         }
 }
 
+bool StoppableSampling::step(std::int64_t elements, const Execution& execution) {
+    if (isDone()) return true;
+    if (!hasBegun_) begin();
+    cutNext(index_->get(execution), elements);
+    const IndexBox piece = pieces_.back();
+    statistics_ += bound_.resample(
+        lattice_, std::span(&piece, 1), [&](std::size_t, const Block& block) { copy(block); }, execution);
+    pieces_.pop_back();
+    if (pieces_.empty()) {
+        sink_(box_, block_);
+        ++box_;
+        hasBegun_ = false;
+    }
+    return isDone();
+}
+
 bool StoppableSampling::advance(std::chrono::steady_clock::time_point deadline, const Execution& execution) {
-    while (!isDone()) {
-        if (!hasBegun_) begin();
-        cutNext(index_->get(execution));
-        const IndexBox piece = pieces_.back();
-        statistics_ += bound_.resample(
-            lattice_, std::span(&piece, 1), [&](std::size_t, const Block& block) { copy(block); }, execution);
-        pieces_.pop_back();
-        if (pieces_.empty()) {
-            sink_(box_, block_);
-            ++box_;
-            hasBegun_ = false;
-        }
-        if (std::chrono::steady_clock::now() >= deadline) break;
+    while (!step(kPieceElements, execution) && std::chrono::steady_clock::now() < deadline) {
     }
     return isDone();
 }

@@ -17,6 +17,9 @@ namespace tessera {
 /// few elements near, so a piece takes about a millisecond; the samples have the same bits as by one call.
 class StoppableSampling {
   public:
+    /// Near a piece that takes about half a millisecond.
+    static constexpr std::int64_t kPieceElements = 1024;
+
     /// @param bound best bound with the same index; must outlive this, as the sink's targets must.
     /// @param sink receives each box once, whole, from advance(). Throws as resample() does.
     StoppableSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
@@ -25,6 +28,9 @@ class StoppableSampling {
     /// Samples pieces until the deadline has passed, one at least. True when everything is sampled. When it
     /// throws, Cancelled for one, what was being sampled is sampled again by the next call.
     bool advance(std::chrono::steady_clock::time_point deadline, const Execution& execution = {});
+    /// Samples one piece. True when everything is sampled. Throws as advance() does.
+    /// @param elements a piece with no more elements near it isn't cut: larger pieces cost less in all.
+    bool step(std::int64_t elements = kPieceElements, const Execution& execution = {});
     bool isDone() const { return box_ == boxes_.size(); }
 
     /// Of the pieces so far.
@@ -32,7 +38,7 @@ class StoppableSampling {
 
   private:
     void begin();
-    void cutNext(const ElementIndex& index);
+    void cutNext(const ElementIndex& index, std::int64_t elements);
     void copy(const Block& piece);
 
     BoundResampler& bound_;

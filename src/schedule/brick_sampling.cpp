@@ -1,6 +1,8 @@
 #include "schedule/brick_sampling.h"
 
 #include <algorithm>
+#include <condition_variable>
+#include <thread>
 #include <utility>
 
 #include "base/check.h"
@@ -23,6 +25,15 @@ class BrickSampling::Order {
 };
 
 namespace {
+
+// Elements of the next piece: large pieces cost less, small ones end in time.
+std::int64_t pieceElements(BrickSampling::Clock::duration left) {
+    constexpr double kElementsAMs = 700;
+    constexpr std::int64_t kMost = 4096;
+    const double ms = std::chrono::duration<double, std::milli>(left).count();
+    return std::clamp(std::int64_t(std::clamp(ms, 0.0, 1e6) * kElementsAMs),
+                      StoppableSampling::kPieceElements / 4, kMost);
+}
 
 IndexBox closedBox(const DepthKey& key, int cells) {
     return {key.index * cells, (key.index + 1) * cells + 1};
@@ -110,61 +121,118 @@ std::shared_ptr<BrickSampling::Task> BrickSampling::nextTask() {
         for (const std::shared_ptr<Task>& task : order->tasks)
             if (!task->isDone && !task->isRunning) {
                 task->isRunning = task->hasBegun = true;
+                ++running_;
                 return task;
             }
     return nullptr;
 }
 
-void BrickSampling::workOnThread(Clock::time_point deadline, const Execution& single, bool& stop) {
-    while (true) {
-        std::shared_ptr<Task> task;
-        {
-            const std::lock_guard lock(mutex_);
-            if (!stop) task = nextTask();
-        }
-        if (!task) return;
-        bool isDone = false, isLate = false, mustStop = false;
-        const auto leave = [&] {
-            const std::lock_guard lock(mutex_);
-            task->isRunning = false;
-            task->isDone = isDone;
-            if (isDone) {
-                statistics_ += task->sampling->statistics();
-                task->sampling.reset();
-                for (std::size_t i = 0; i < queue_.size(); ++i) {
-                    const auto& tasks = queue_[i]->tasks;
-                    if (std::find(tasks.begin(), tasks.end(), task) == tasks.end()) continue;
-                    if (--queue_[i]->left > 0) break;
-                    stop = stop || i == 0;
-                    queue_.erase(queue_.begin() + std::ptrdiff_t(i));
-                    break;
-                }
-            }
-            if (isLate) stop = true;
-        };
-        try {
-            // A piece at a time, so that a thread stops soon when another one has finished the first order.
-            while (!isDone && !isLate && !mustStop) {
-                isDone = task->sampling->advance(Clock::now(), single);
-                isLate = Clock::now() >= deadline;
-                const std::lock_guard lock(mutex_);
-                mustStop = stop;
-            }
-        } catch (...) {
-            leave();
-            throw;
-        }
-        leave();
-    }
+void BrickSampling::endPiece(const std::shared_ptr<Task>& task, bool isDone) {
+    --running_;
+    task->isRunning = false;
+    task->isDone = isDone;
+    if (!isDone) return;
+    statistics_ += task->sampling->statistics();
+    task->sampling.reset();
+    const auto order = std::find_if(queue_.begin(), queue_.end(), [&](const std::shared_ptr<Order>& queued) {
+        return std::find(queued->tasks.begin(), queued->tasks.end(), task) != queued->tasks.end();
+    });
+    if (order == queue_.end() || --(*order)->left > 0) return;
+    queue_.erase(order);
+    anyDone_ = true;
 }
 
-void BrickSampling::work(Clock::time_point deadline, const Execution& execution) {
-    bool stop = false;
+/// The threads of one call of work().
+class BrickSampling::Crew {
+  public:
+    Crew(BrickSampling& sampling, Clock::time_point deadline, const Execution& execution,
+         const std::function<void()>& whenDone)
+        : sampling_(sampling), deadline_(deadline), execution_(execution), whenDone_(whenDone) {}
+
+    void work() {
+        const bool isCaller = std::this_thread::get_id() == caller_;
+        try {
+            while (isCaller ? leadOn() : followOn()) {
+            }
+        } catch (...) {
+            end();
+            throw;
+        }
+        if (isCaller) end();
+    }
+
+  private:
+    void end() {
+        const std::lock_guard lock(sampling_.mutex_);
+        hasEnded_ = true;
+        changed_.notify_all();
+    }
+    bool isLate() const { return Clock::now() >= deadline_; }
+
+    // The calling thread shows what is done and gives new work; it goes when another thread has gone, as
+    // there may be work for it again.
+    bool leadOn() {
+        std::unique_lock lock(sampling_.mutex_);
+        if (std::exchange(sampling_.anyDone_, false)) {
+            lock.unlock();
+            whenDone_();
+            lock.lock();
+            changed_.notify_all();
+            if (hasGone_ || isLate()) return false;
+        }
+        if (const auto task = sampling_.nextTask()) return piece(task, lock);
+        if (sampling_.running_ == 0 && !sampling_.anyDone_) return false;
+        wait(lock);
+        return !isLate();
+    }
+
+    bool followOn() {
+        std::unique_lock lock(sampling_.mutex_);
+        if (hasEnded_) return false;
+        if (const auto task = sampling_.nextTask()) return piece(task, lock);
+        // Nobody but the caller gives work, and it may not be among these threads.
+        hasGone_ = sampling_.running_ == 0;
+        if (hasGone_) return false;
+        wait(lock);
+        return !isLate();
+    }
+
+    void wait(std::unique_lock<std::mutex>& lock) {
+        changed_.wait_until(lock, std::min(deadline_, Clock::now() + std::chrono::milliseconds(20)));
+    }
+
+    bool piece(const std::shared_ptr<Task>& task, std::unique_lock<std::mutex>& lock) {
+        lock.unlock();
+        bool isDone = false;
+        try {
+            execution_.throwIfCancelled();
+            isDone = task->sampling->step(pieceElements(deadline_ - Clock::now()), execution_);
+        } catch (...) {
+            lock.lock();
+            sampling_.endPiece(task, false);
+            throw;
+        }
+        lock.lock();
+        sampling_.endPiece(task, isDone);
+        if (isDone) changed_.notify_all();
+        return !hasEnded_ && !isLate();
+    }
+
+    BrickSampling& sampling_;
+    Clock::time_point deadline_;
+    Execution execution_;
+    const std::function<void()>& whenDone_;
+    std::thread::id caller_ = std::this_thread::get_id();
+    std::condition_variable changed_;
+    bool hasEnded_ = false, hasGone_ = false;
+};
+
+void BrickSampling::work(Clock::time_point deadline, const Execution& execution,
+                         const std::function<void()>& whenDone) {
     Execution single = execution.withoutProgress();
     single.threads = 1;
-    const int threads = execution.threadCount();
-    parallelFor(execution.withoutProgress(), threads,
-                [&](std::int64_t) { workOnThread(deadline, single, stop); });
+    Crew crew(*this, deadline, single, whenDone);
+    parallelFor(execution.withoutProgress(), execution.threadCount(), [&](std::int64_t) { crew.work(); });
 }
 
 }  // namespace tessera

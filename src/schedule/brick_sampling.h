@@ -48,22 +48,26 @@ class BrickSampling {
     /// Takes an order out of the queue; what was sampled of it is lost.
     void drop(const Order& order);
 
-    /// Samples until the deadline has passed, the first order is done, or nothing is left. When it throws,
-    /// what was being sampled is sampled again by the next call.
-    void work(Clock::time_point deadline, const Execution& execution);
+    /// Samples until the deadline has passed, a little at least, or nothing is left. When it throws, what was
+    /// being sampled is sampled again by the next call.
+    /// @param whenDone called by the calling thread whenever an order is done; may take and give orders.
+    void work(Clock::time_point deadline, const Execution& execution, const std::function<void()>& whenDone);
 
     const ResampleStatistics& statistics() const { return statistics_; }
 
   private:
     struct Task;
-    void workOnThread(Clock::time_point deadline, const Execution& single, bool& stop);
+    class Crew;
     std::shared_ptr<Task> nextTask();
+    void endPiece(const std::shared_ptr<Task>& task, bool isDone);
 
     BoundResampler& bound_;
     std::shared_ptr<const SharedElementIndex> index_;
     const PlanFrame& frame_;
-    std::mutex mutex_;
-    std::deque<std::shared_ptr<Order>> queue_;
+    std::mutex mutex_;                          ///< of all below
+    std::deque<std::shared_ptr<Order>> queue_;  ///< that aren't done
+    bool anyDone_ = false;                      ///< since whenDone was called
+    int running_ = 0;                           ///< tasks
     ResampleStatistics statistics_;
 };
 

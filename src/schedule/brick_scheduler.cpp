@@ -179,7 +179,7 @@ bool BrickScheduler::beginChange(const WishPlan::Split& split) {
 // Takes changes from the plan until there are enough to keep all threads at work. False when the plan has no
 // more.
 bool BrickScheduler::fillQueue(Clock::time_point deadline) {
-    constexpr std::size_t kAtOnce = 4;
+    constexpr std::size_t kAtOnce = 8;
     while (changes_.size() < kAtOnce && hasRoots_) {
         if (!next_) next_ = plan_->next();
         if (!next_) return false;
@@ -308,8 +308,10 @@ bool BrickScheduler::update(Clock::time_point deadline, const Execution& executi
         execution.throwIfCancelled();
         const bool planGoesOn = fillQueue(deadline);
         if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return isAtRest_ = true;
-        if (!changes_.empty() && !BrickSampling::isDone(*changes_.front().order))
-            sampling_.work(deadline, execution);
+        if (!changes_.empty())
+            sampling_.work(deadline, execution, [&] {
+                if (publishFinished()) fillQueue(deadline);
+            });
         publishFinished();
         if (Clock::now() >= deadline) return false;
     }

@@ -175,6 +175,7 @@ TEST(MeshBricks, FindTheBricksThatHoldElements) {
                 const DepthKey key = leaf->key;
                 const auto number = bricks.find(key);
                 ASSERT_TRUE(number.has_value());
+                // Few enough to be counted exactly.
                 EXPECT_GE(bricks.elementsNear(*number), std::int64_t(leaf->elements.size()));
                 const ChildBits children = bricks.children(*number);
                 plan.split({&key, 1}, GrowingTree::kNoLimit, {});

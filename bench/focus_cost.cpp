@@ -1,0 +1,190 @@
+// What a focus that moves costs: focus_cost [mesh.vtu...] [--elements 1000000] [--resolution 512] [--jumps
+// 200]
+//
+// A scheduler comes to rest around a first focus. Then the focus jumps to random nodes: "better" is the time
+// until the brick that holds the node is shown one depth finer than before, with what balance asks for; "at
+// rest" until everything is. Beside that: what update() overshoots its deadline by, what a new plan costs
+// alone, and a uniform resampling at the same finest spacing. radius is a sixteenth of the longest side.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "arguments.h"
+#include "base/timer.h"
+#include "graded_box.h"
+#include "mesh_files/read_mesh.h"
+#include "reference/random.h"
+#include "refine/plan.h"
+#include "refine/plan_frame.h"
+#include "refine/resample_tree.h"
+#include "schedule/brick_scheduler.h"
+#include "tessera/registry.h"
+
+namespace {
+
+using namespace tessera;
+using Clock = BrickScheduler::Clock;
+
+struct Options {
+    std::vector<std::string> meshPaths;
+    std::vector<std::int64_t> elements{1000000};
+    std::string algorithm = "software";
+    int resolution = 512, jumps = 200, threads = 2, frameMs = 8;
+    double budgetMb = 2000;
+    double radius = 1.0 / 16;
+};
+
+double quantile(std::vector<double> values, double share) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[std::min(values.size() - 1, std::size_t(share * double(values.size())))];
+}
+
+/// Notes when the leaf at a place becomes finer than it was.
+class Watch : public BrickTarget {
+  public:
+    void publish(const Publication& publication) override {
+        if (isBetter) return;
+        for (const ShownBrick& brick : publication.added)
+            if (brick.leaf.key.depth > before && ancestorKey(wanted, brick.leaf.key.depth) == brick.leaf.key)
+                isBetter = true, betterMs = timer.elapsedMs();
+    }
+    DepthKey wanted;  ///< the finest brick at the place
+    Depth before;
+    bool isBetter = false;
+    double betterMs = 0;
+    Timer timer;
+};
+
+std::string figures(const std::vector<double>& ms) {
+    return fmt::format("median {:.2f} ms, 99 % {:.2f}, most {:.2f}", quantile(ms, 0.5), quantile(ms, 0.99),
+                       quantile(ms, 1));
+}
+
+void measure(const Options& options, const std::string& name, const TetMesh& mesh) {
+    const std::vector<int> fields{0};
+    const int channels = mesh.fields[0].components;
+    const Resampler& resampler = findResampler(options.algorithm);
+    const Execution execution{.threads = options.threads};
+    Timer timer;
+    ScheduleOptions schedule;
+    schedule.refine.criterion = Criterion::focus;
+    schedule.refine.resolution = options.resolution;
+    schedule.refine.bind.index = std::make_shared<const SharedElementIndex>(mesh);
+    schedule.refine.bind.index->get(execution);
+    const double indexMs = timer.restart();
+    const Box3d bounds = meshBounds(mesh, execution, schedule.refine.bind.index->ifBuilt());
+    const Vec3d size = bounds.size();
+    const double longest = std::max({size.x, size.y, size.z}), radius = options.radius * longest;
+    Random random(1);
+    const auto node = [&] {
+        const auto& tet = mesh.tets[std::size_t(random.below(int(mesh.elementCount())))];
+        return mesh.points[std::size_t(tet[0])];
+    };
+    schedule.refine.focus = {pointFocus(node(), radius)};
+    schedule.budgetBytes = std::int64_t(options.budgetMb * 1e6);
+    std::printf("\n%s: %lld elements, index in %.0f ms; finest spacing of %d points along the longest side\n",
+                name.c_str(), static_cast<long long>(mesh.elementCount()), indexMs, options.resolution);
+    Watch watch;
+    timer.restart();
+    BrickScheduler scheduler(mesh, fields, resampler, schedule, watch, execution);
+    scheduler.finish(execution);
+    const double firstMs = timer.restart();
+    const std::int64_t leaves = std::int64_t(scheduler.tree().leafCount());
+    const int cells = scheduler.frame().brickCells;
+    const double brickPoints = std::pow(cells, 3);
+    std::printf("  from nothing to rest: %.0f ms, %lld leaves, %.3g voxels, %.0f MB\n", firstMs,
+                static_cast<long long>(leaves), double(leaves) * brickPoints,
+                double(scheduler.bytes()) / 1e6);
+
+    // The same without ways to stop: the tree at once.
+    RefineOptions refine = schedule.refine;
+    refine.maxVoxels = std::int64_t(1) << 34;
+    const auto sampleAtOnce = [&](Criterion criterion) {
+        refine.criterion = criterion;
+        timer.restart();
+        const BrickTree tree = planBricks(mesh, refine, execution, channels);
+        const double planMs = timer.restart();
+        const auto bound = resampler.bind(mesh, fields, refine.bind);
+        ResampleStatistics statistics;
+        resampleTree(tree, *bound, channels, execution, statistics);
+        const double ms = timer.elapsedMs();
+        std::printf("  %s: plan %.0f ms, samples %.0f ms, %.3g voxels\n",
+                    criterion == Criterion::uniform ? "uniform" : "focus, offline", planMs, ms,
+                    double(tree.leafCount()) * brickPoints);
+        return ms + planMs;
+    };
+    sampleAtOnce(Criterion::focus);
+    const double uniformMs = sampleAtOnce(Criterion::uniform);
+    std::printf("  from nothing to rest over uniform: %.1f %% of the time\n", 100 * firstMs / uniformMs);
+
+    std::vector<double> better, rest, over, call, plans;
+    const std::int64_t sampledBefore = scheduler.counts().sampled;
+    for (int jump = 0; jump < options.jumps; ++jump) {
+        const Vec3d place = node();
+        const Depth finest = scheduler.frame().maxDepth;
+        const double edge = scheduler.frame().spacingWorld(finest) * cells;
+        watch.wanted = {finest, Vec3i(glm::floor((place - scheduler.frame().originWorld) / edge))};
+        const auto leaf = scheduler.tree().findCovering(watch.wanted);
+        const bool canImprove = leaf && leaf->key.depth < finest;
+        if (leaf) watch.before = leaf->key.depth;
+        watch.isBetter = !canImprove;
+        watch.timer.restart();
+        scheduler.setFocus({pointFocus(place, radius)});
+        call.push_back(watch.timer.elapsedMs());
+        while (true) {
+            const auto deadline = Clock::now() + std::chrono::milliseconds(options.frameMs);
+            const bool atRest = scheduler.update(deadline, execution);
+            if (atRest) break;
+            over.push_back(std::chrono::duration<double, std::milli>(Clock::now() - deadline).count());
+        }
+        rest.push_back(watch.timer.elapsedMs());
+        if (canImprove && watch.isBetter) better.push_back(watch.betterMs);
+    }
+    for (int n = 0; n < 3; ++n) {
+        timer.restart();
+        WishPlanning planning(mesh, bounds, schedule.refine, GrowingTree::kNoLimit, execution);
+        planning.plan.complete();
+        plans.push_back(timer.elapsedMs());
+    }
+    const ScheduleCounts& counts = scheduler.counts();
+    std::printf(
+        "  %d jumps (%zu to places that weren't fine yet), %lld bricks sampled, %lld reused, %lld dropped\n",
+        options.jumps, better.size(), static_cast<long long>(counts.sampled - sampledBefore),
+        static_cast<long long>(counts.reused), static_cast<long long>(counts.dropped));
+    std::printf(
+        "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n"
+        "    a plan from nothing: %s\n",
+        figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str(),
+        figures(plans).c_str());
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+    Options options;
+    bench::Arguments arguments("What a focus that moves costs");
+    arguments.add("meshes", options.meshPaths, "mesh files; without, graded boxes of --elements");
+    arguments.add("--elements", options.elements, "sizes of the graded boxes");
+    arguments.add("--algorithm", options.algorithm, "");
+    arguments.add("--resolution", options.resolution, "of the finest spacing");
+    arguments.add("--radius", options.radius, "share of the longest side");
+    arguments.add("--jumps", options.jumps, "");
+    arguments.add("--threads", options.threads, "");
+    arguments.add("--frame", options.frameMs, "milliseconds of one update()");
+    arguments.add("--budget", options.budgetMb, "megabytes");
+    return arguments.run(count, words, [&] {
+        for (const std::string& path : options.meshPaths) measure(options, path, readMesh(path, {}, {}).mesh);
+        if (options.meshPaths.empty())
+            for (const std::int64_t elements : options.elements)
+                measure(options, "graded box", bench::gradedBox(elements));
+        return 0;
+    });
+}
