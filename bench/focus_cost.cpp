@@ -125,7 +125,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     const double uniformMs = sampleAtOnce(Criterion::uniform);
     std::printf("  from nothing to rest over uniform: %.1f %% of the time\n", 100 * firstMs / uniformMs);
 
-    std::vector<double> better, rest, over, call, plans;
+    std::vector<double> better, rest, over, call, plans, replans;
     const std::int64_t sampledBefore = scheduler.counts().sampled;
     for (int jump = 0; jump < options.jumps; ++jump) {
         const Vec3d place = node();
@@ -152,7 +152,10 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         timer.restart();
         WishPlanning planning(mesh, bounds, schedule.refine, GrowingTree::kNoLimit, execution);
         planning.plan.complete();
-        plans.push_back(timer.elapsedMs());
+        plans.push_back(timer.restart());
+        WishPlan again(planning.bricks, planning.plan.wishes(), {});
+        again.complete();
+        replans.push_back(timer.elapsedMs());
     }
     const ScheduleCounts& counts = scheduler.counts();
     std::printf(
@@ -161,9 +164,9 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         static_cast<long long>(counts.reused), static_cast<long long>(counts.dropped));
     std::printf(
         "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n"
-        "    a plan from nothing: %s\n",
+        "    a plan from nothing: %s\n    of bricks looked at before: %s\n",
         figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str(),
-        figures(plans).c_str());
+        figures(plans).c_str(), figures(replans).c_str());
 }
 
 }  // namespace

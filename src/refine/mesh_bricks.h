@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -73,7 +74,8 @@ class MeshBricks {
     std::vector<float> sizes_;  ///< in units of the root spacing
     std::vector<Vec3i> roots_;
     RootGrid<Number> rootNumbers_;  ///< one more than the root's number; 0: no root
-    std::vector<Brick> bricks_;     ///< the roots, then eight places for the children of each brick looked at
+    std::deque<Brick> bricks_;  ///< not moved in memory as they get more: the roots, then eight places for
+                                ///< the children of each brick looked at
     std::vector<std::int32_t> found_;
     std::vector<float> foundSizes_;
 };

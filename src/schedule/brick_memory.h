@@ -23,6 +23,8 @@ struct DepthKeyHash {
 /// first to be dropped.
 class BrickMemory {
   public:
+    /// Makes place for so many, so that no later call takes long for it.
+    void reserve(std::size_t bricks) { bricks_.reserve(bricks); }
     std::size_t brickCount() const { return bricks_.size(); }
     bool contains(const DepthKey& key) const { return bricks_.contains(key); }
     /// Null when it isn't there.

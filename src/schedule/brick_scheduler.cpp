@@ -72,6 +72,9 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       budgetBytes_(options.budgetBytes),
       wishes_{options.refine.focus, focusSpacing(index_->get().boundsWorld(), options.refine)},
       sampling_(*bound_, index_, bricks_.frame()) {
+    constexpr std::size_t kMostReserved = 1 << 20;
+    memory_.reserve(std::min(budgetBricks(), kMostReserved));
+    splits_.reserve(std::min(budgetBricks(), kMostReserved) / 8);
     replan();
     beginRoots();
 }
