@@ -146,4 +146,18 @@ double MeshBricks::wishedByElementSize(Number brick) {
     return wishedByElementSize(brick);
 }
 
+void MeshBricks::setFindings(Number brick, BrickFindings findings) {
+    bricks_[brick].findings = std::make_unique<const BrickFindings>(std::move(findings));
+}
+
+const ValueMask& MeshBricks::values(Number brick, const BrickInspector& inspector) {
+    std::unique_ptr<const ValueMask>& values = bricks_[brick].values;
+    if (!values) {
+        found_.clear();
+        index_.query(boxAround(key(brick), frame_), found_);
+        values = std::make_unique<const ValueMask>(inspector.binsOf(found_));
+    }
+    return *values;
+}
+
 }  // namespace tessera

@@ -12,7 +12,9 @@
 #include "brick/growing_tree.h"
 #include "brick/root_grid.h"
 #include "mesh/element_index.h"
+#include "refine/brick_findings.h"
 #include "refine/brick_plan.h"
+#include "refine/visible_values.h"
 #include "tessera/execution.h"
 #include "tessera/mesh.h"
 
@@ -53,6 +55,13 @@ class MeshBricks {
     /// samplesPerElement lattice points along their edges. World units; kNoWish when sizes aren't wanted.
     double wishedByElementSize(Number brick);
 
+    /// What the brick's samples show, once somebody has told; null before.
+    const BrickFindings* findings(Number brick) const { return bricks_[brick].findings.get(); }
+    void setFindings(Number brick, BrickFindings findings);
+    /// Values of the inspector's channel that the elements near the brick have: coarse samples would miss
+    /// thin features. @param inspector the same in every call.
+    const ValueMask& values(Number brick, const BrickInspector& inspector);
+
   private:
     struct Brick {
         DepthKey key;
@@ -60,6 +69,8 @@ class MeshBricks {
         ChildBits children = 0;
         std::int32_t elementsNear = -1;  ///< -1: not counted yet
         float wishedByElementSize = -1;  ///< -1: not looked for yet
+        std::unique_ptr<const BrickFindings> findings;
+        std::unique_ptr<const ValueMask> values;
     };
 
     void findRoots();

@@ -201,8 +201,8 @@ WishPlanning::WishPlanning(const TetMesh& mesh, const Box3d& meshBox, const Refi
              chooseFrame(meshBox, options),
              options.criterion.has(Criterion::elementSize) ? options.samplesPerElement : 0, execution),
       plan(bricks,
-           {options.criterion.has(Criterion::focus) ? options.focus : std::vector<Focus>{},
-            focusSpacing(meshBox, options)},
+           Wishes{.focus = options.criterion.has(Criterion::focus) ? options.focus : std::vector<Focus>{},
+                  .finestSpacingWorld = focusSpacing(meshBox, options)},
            {PlanLimit::Counts::leaves, maxLeaves}) {}
 
 BrickTree planBricks(const TetMesh& mesh, const RefineOptions& options, const Execution& execution,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <numeric>
 #include <span>
 #include <string>
@@ -22,6 +23,11 @@ constexpr double kCostSplit = 50'000;
 // Bricks that hold a focus come before what lies around it.
 constexpr double kFocusGain = 64;
 
+// A brick of which little is seen still counts for so much.
+constexpr double kLeastSeen = 0.05;
+// Splits by errors until new findings are waited for.
+constexpr int kSplitsInRound = 32;
+
 struct LimitReached {};
 
 }  // namespace
@@ -39,27 +45,106 @@ WishPlan::WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit)
 }
 
 double WishPlan::wishedSpacing(MeshBricks::Number brick) const {
-    return std::min(bricks_.wishedByElementSize(brick),
-                    wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    if (!isSeen(brick)) return kNoWish;
+    return std::min({bricks_.wishedByElementSize(brick), wishedByError(brick),
+                     wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick))});
+}
+
+// Trilinear errors fall with the square of the spacing.
+double WishPlan::wishedByError(MeshBricks::Number brick) const {
+    const BrickFindings* findings = wishes_.byError ? bricks_.findings(brick) : nullptr;
+    if (!findings) return kNoWish;
+    const double ratio = wishes_.visible ? wishes_.visible->visibleError(findings->bins) /
+                                               wishes_.inspector->watchedBoundBins()
+                                         : double(findings->worst);
+    return ratio > 1 ? bricks_.spacingWorld(brick) / std::sqrt(ratio) : kNoWish;
+}
+
+bool WishPlan::isSeen(MeshBricks::Number brick) const {
+    return !wishes_.visible || wishes_.visible->showsAny(bricks_.values(brick, *wishes_.inspector));
+}
+
+double WishPlan::costOfSplit(MeshBricks::Number brick) const {
+    const int cells = bricks_.frame().brickCells;
+    const double points = double(cells) * cells * cells * std::popcount(bricks_.children(brick));
+    return kCostSplit + kCostPoint * points + kCostElement * double(bricks_.elementsNear(brick));
 }
 
 double WishPlan::valueOfSplit(MeshBricks::Number brick) const {
-    const double spacing = bricks_.spacingWorld(brick), wished = wishedSpacing(brick);
-    if (!isTooCoarse(spacing, wished)) return 0;
-    const int cells = bricks_.frame().brickCells;
-    const double points = double(cells) * cells * cells * std::popcount(bricks_.children(brick));
-    const double cost = kCostSplit + kCostPoint * points + kCostElement * double(bricks_.elementsNear(brick));
+    if (!isSeen(brick)) return 0;
+    const double spacing = bricks_.spacingWorld(brick);
+    const double wished =
+        std::min(bricks_.wishedByElementSize(brick),
+                 wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    if (!isTooCoarse(spacing, wished)) return valueOfError(brick);
     const double gain = holdsFocus(wishes_.focus, bricks_.boxWorld(brick)) ? kFocusGain : 1;
-    return gain * benefitOfSplit(spacing, wished) / cost;
+    return gain * (1 + benefitOfSplit(spacing, wished)) / costOfSplit(brick);
+}
+
+// Less than what any other criterion gives, and more the more of the brick is seen.
+double WishPlan::valueOfError(MeshBricks::Number brick) const {
+    const double spacing = bricks_.spacingWorld(brick), wished = wishedByError(brick);
+    if (!isTooCoarse(spacing, wished)) return 0;
+    double seen = 1;
+    if (wishes_.visible) {
+        const BrickFindings& findings = *bricks_.findings(brick);
+        const double most = wishes_.visible->visibleError(findings.bins);
+        seen = kLeastSeen + (1 - kLeastSeen) * wishes_.visible->meanVisibleError(findings.bins) / most;
+    }
+    const double benefit = benefitOfSplit(spacing, wished);
+    return seen * benefit / (1 + benefit) / costOfSplit(brick);
 }
 
 void WishPlan::consider(MeshBricks::Number brick) {
     const DepthKey& key = bricks_.key(brick);
-    if (key.depth >= bricks_.frame().maxDepth) return;
-    const double value = valueOfSplit(brick);
-    if (value == 0) return;
-    candidates_.push_back({value, brick, bricks_.key(brick)});
-    std::push_heap(candidates_.begin(), candidates_.end());
+    if (key.depth >= bricks_.frame().maxDepth || !isSeen(brick)) return;
+    const double wished =
+        std::min(bricks_.wishedByElementSize(brick),
+                 wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    if (isTooCoarse(bricks_.spacingWorld(brick), wished)) {
+        candidates_.push_back({valueOfSplit(brick), brick, key});
+        std::push_heap(candidates_.begin(), candidates_.end());
+    } else if (wishes_.byError) {
+        unjudged_.push_back(brick);
+    }
+}
+
+// Begins a round. False when it must wait.
+bool WishPlan::considerErrors() {
+    waitsFor_.clear();
+    // Balance may have split some since.
+    std::erase_if(unjudged_, [&](MeshBricks::Number brick) { return !tree_.findLeaf(bricks_.key(brick)); });
+    for (const MeshBricks::Number brick : unjudged_)
+        if (!bricks_.findings(brick)) waitsFor_.push_back(brick);
+    if (!waitsFor_.empty()) return false;
+    for (const MeshBricks::Number brick : unjudged_) {
+        const double value = valueOfError(brick);
+        if (value == 0) continue;
+        byError_.push_back({value, brick, bricks_.key(brick)});
+        std::push_heap(byError_.begin(), byError_.end());
+    }
+    unjudged_.clear();
+    leftInRound_ = kSplitsInRound;
+    return true;
+}
+
+// The best leaf to split; none when the plan is complete or waits.
+std::optional<WishPlan::Candidate> WishPlan::popCandidate() {
+    while (true) {
+        std::vector<Candidate>* from = &candidates_;
+        if (candidates_.empty()) {
+            if (!wishes_.byError) return {};
+            const bool isNewRound = leftInRound_ == 0 || byError_.empty();
+            if (isNewRound && (!considerErrors() || byError_.empty())) return {};
+            --leftInRound_;
+            from = &byError_;
+        }
+        std::pop_heap(from->begin(), from->end());
+        const Candidate candidate = from->back();
+        from->pop_back();
+        // Balance may have split it before its turn.
+        if (tree_.findLeaf(candidate.key)) return candidate;
+    }
 }
 
 // False, and the plan is as it was, when the limit doesn't allow it.
@@ -104,15 +189,11 @@ bool WishPlan::split(const DepthKey& key) {
 
 std::optional<WishPlan::Split> WishPlan::next() {
     while (made_.empty()) {
-        if (candidates_.empty()) return {};
-        std::pop_heap(candidates_.begin(), candidates_.end());
-        const DepthKey key = candidates_.back().key;
-        candidates_.pop_back();
-        // Balance may have split it before its turn.
-        if (!tree_.findLeaf(key)) continue;
-        if (split(key)) continue;
-        isCutShort_ = true;
-        candidates_.clear();
+        if (isCutShort_) return {};
+        const std::optional<Candidate> best = popCandidate();
+        if (!best) return {};
+        isCutShort_ = !split(best->key);
+        if (isCutShort_) waitsFor_.clear();
     }
     const Split split = made_.back();
     made_.pop_back();

@@ -2,11 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "brick/growing_tree.h"
+#include "refine/brick_findings.h"
 #include "refine/mesh_bricks.h"
+#include "refine/visible_values.h"
 #include "tessera/focus.h"
 
 namespace tessera {
@@ -17,6 +21,14 @@ struct Wishes {
     std::vector<Focus> focus;
     /// h_0, world units.
     double finestSpacingWorld = 0;
+    /// By the errors that the inspector finds, until they are within its bound.
+    bool byError = false;
+    /// Needed for errors and for what is seen.
+    std::shared_ptr<const BrickInspector> inspector = nullptr;
+    /// Not null: only where what the inspector's channel shows can be seen. A brick whose
+    /// elements have no value that is seen wishes nothing, by whatever criterion; of errors those count that
+    /// change a colour.
+    std::shared_ptr<const VisibleValues> visible = nullptr;
 };
 
 /// How many bricks a plan may have.
@@ -48,9 +60,11 @@ class WishPlan {
     /// @param bricks must outlive it. Throws InputError when the roots are more than the limit.
     WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit);
 
-    /// Null when the plan is complete.
+    /// Null when the plan is complete, or waits.
     std::optional<Split> next();
-    /// All that is left. Throws Cancelled.
+    /// The plan goes on when there are findings of these leaves (MeshBricks::setFindings).
+    std::span<const MeshBricks::Number> waitsFor() const { return waitsFor_; }
+    /// All that is left, without errors. Throws Cancelled.
     void complete(const Execution& execution = {});
 
     /// What next() has given so far, and perhaps a few splits more.
@@ -58,7 +72,8 @@ class WishPlan {
     const Wishes& wishes() const { return wishes_; }
     /// Some leaf wishes to be split, and the limit doesn't allow it.
     bool isCutShort() const { return isCutShort_; }
-    /// The finest spacing wished for in a brick, world units; kNoWish without any.
+    /// The finest spacing wished for in a brick, world units; kNoWish without any. Errors count where there
+    /// are findings.
     double wishedSpacing(MeshBricks::Number brick) const;
     /// Benefit for cost of splitting a brick, whether it is a leaf or not; 0 where none is wished.
     double valueOfSplit(MeshBricks::Number brick) const;
@@ -74,7 +89,13 @@ class WishPlan {
         }
     };
 
+    double wishedByError(MeshBricks::Number brick) const;
+    double costOfSplit(MeshBricks::Number brick) const;
+    double valueOfError(MeshBricks::Number brick) const;
+    bool isSeen(MeshBricks::Number brick) const;
     void consider(MeshBricks::Number brick);
+    bool considerErrors();
+    std::optional<Candidate> popCandidate();
     bool split(const DepthKey& key);
 
     MeshBricks& bricks_;
@@ -82,8 +103,11 @@ class WishPlan {
     PlanLimit limit_;
     GrowingTree tree_;
     std::vector<MeshBricks::Number> numberOfSlot_;
-    std::vector<Candidate> candidates_;  ///< a heap
-    std::vector<Split> made_;            ///< to be given out, the next one last
+    std::vector<Candidate> candidates_;                    ///< a heap
+    std::vector<Candidate> byError_;                       ///< likewise, of leaves that have findings
+    std::vector<MeshBricks::Number> unjudged_, waitsFor_;  ///< leaves whose errors weren't looked at
+    int leftInRound_ = 0;
+    std::vector<Split> made_;  ///< to be given out, the next one last
     std::size_t splitCount_ = 0;
     bool isCutShort_ = false;
 };

@@ -62,8 +62,8 @@ std::shared_ptr<const Block> cut(const Block& from, const IndexBox& box) {
 }  // namespace
 
 BrickSampling::BrickSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
-                             const PlanFrame& frame)
-    : bound_(bound), index_(std::move(index)), frame_(frame) {}
+                             const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector)
+    : bound_(bound), index_(std::move(index)), frame_(frame), inspector_(std::move(inspector)) {}
 
 BrickSampling::~BrickSampling() = default;
 
@@ -84,7 +84,11 @@ std::shared_ptr<BrickSampling::Order> BrickSampling::order(std::span<const std::
             bound_, index_, Lattice::axisParallel(frame_.originWorld, spacing), std::span(&box, 1),
             [this, cells, keys = bricks, to = order.get()](std::size_t, const Block& block) {
                 std::vector<SampledBrick> parts;
-                for (const DepthKey& key : keys) parts.push_back({key, cut(block, closedBox(key, cells))});
+                for (const DepthKey& key : keys) {
+                    parts.push_back({key, cut(block, closedBox(key, cells)), {}});
+                    if (inspector_)
+                        parts.back().findings = inspector_->inspect(key, *parts.back().samples, frame_);
+                }
                 const std::lock_guard lock(mutex_);
                 to->sampled.insert(to->sampled.end(), parts.begin(), parts.end());
             });

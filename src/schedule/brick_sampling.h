@@ -6,10 +6,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "brick/depth.h"
+#include "refine/brick_findings.h"
 #include "refine/brick_plan.h"
 #include "resample/stoppable_sampling.h"
 #include "tessera/execution.h"
@@ -21,6 +23,7 @@ namespace tessera {
 struct SampledBrick {
     DepthKey key;
     std::shared_ptr<const Block> samples;
+    std::optional<BrickFindings> findings;
 };
 
 /// Samples bricks in the order in which they were asked for, on several threads, stopping and going on within
@@ -32,9 +35,10 @@ class BrickSampling {
     /// What is sampled for one change of the tree.
     class Order;
 
-    /// All must outlive it; the resampler is best bound with the same index.
+    /// All must outlive it; the resampler is best bound with the same index. @param inspector looks at each
+    /// brick that is sampled; may be null.
     BrickSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
-                  const PlanFrame& frame);
+                  const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector);
     ~BrickSampling();
 
     /// Puts bricks of one depth at the end of the queue.
@@ -64,6 +68,7 @@ class BrickSampling {
     BoundResampler& bound_;
     std::shared_ptr<const SharedElementIndex> index_;
     const PlanFrame& frame_;
+    std::shared_ptr<const BrickInspector> inspector_;
     std::mutex mutex_;                          ///< of all below
     std::deque<std::shared_ptr<Order>> queue_;  ///< that aren't done
     bool anyDone_ = false;                      ///< since whenDone was called

@@ -25,9 +25,8 @@ PlanFrame frameOf(const TetMesh& mesh, const ScheduleOptions& options, const Ele
     RefineOptions withFocus = refine;
     if (withFocus.focus.empty()) withFocus.focus.push_back(pointFocus(box.min, 1));
     checkOptions(mesh, box, withFocus);
-    if (refine.criterion.has(Criterion::error) || refine.criterion.has(Criterion::uniform))
-        throw InputError("a scheduler refines by element size, by a focus, or both, not by " +
-                         nameOf(refine.criterion));
+    if (refine.criterion.has(Criterion::uniform))
+        throw InputError("a scheduler refines by element size, error or a focus, not to one spacing");
     return chooseFrame(box, refine);
 }
 
@@ -50,6 +49,34 @@ std::shared_ptr<const SharedElementIndex> indexOf(const TetMesh& mesh, const Sch
     return std::make_shared<const SharedElementIndex>(mesh);
 }
 
+// The channel whose values are looked at: that of a field's first component, by its name.
+int channelOf(const TetMesh& mesh, std::span<const int> fields, const std::string& name) {
+    int channel = 0;
+    for (const int f : fields) {
+        const Field& field = mesh.fields.at(std::size_t(f));
+        if (name.empty() || field.name == name) return channel;
+        channel += field.components;
+    }
+    throw InputError("the transfer function is for field " + name + ", which isn't among those sampled");
+}
+
+Wishes firstWishes(const TetMesh& mesh, std::span<const int> fields, const ScheduleOptions& options,
+                   std::shared_ptr<const SharedElementIndex> index, const Execution& execution) {
+    const RefineOptions& refine = options.refine;
+    Wishes wishes{.focus = refine.focus,
+                  .finestSpacingWorld = focusSpacing(index->get().boundsWorld(), refine),
+                  .byError = refine.criterion.has(Criterion::error)};
+    if (!refine.criterion.has(Criterion::focus)) wishes.focus.clear();
+    if (!wishes.byError && !options.transferFunction) return wishes;
+    const std::string name = options.transferFunction ? options.transferFunction->field : "";
+    wishes.inspector = std::make_shared<const BrickInspector>(std::move(index), fields, refine,
+                                                              channelOf(mesh, fields, name), execution);
+    if (options.transferFunction)
+        wishes.visible = std::make_shared<const VisibleValues>(*options.transferFunction,
+                                                               wishes.inspector->watchedRange());
+    return wishes;
+}
+
 std::vector<DepthKey> childrenOf(const DepthKey& key, ChildBits children) {
     std::vector<DepthKey> keys;
     for (unsigned bits = children; bits != 0; bits &= bits - 1)
@@ -70,8 +97,9 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       target_(target),
       brickBytes_(bytesOfBrick(mesh, fields, options.refine.brickCells)),
       budgetBytes_(options.budgetBytes),
-      wishes_{options.refine.focus, focusSpacing(index_->get().boundsWorld(), options.refine)},
-      sampling_(*bound_, index_, bricks_.frame()) {
+      watchedField_(options.transferFunction ? options.transferFunction->field : ""),
+      wishes_(firstWishes(mesh, fields, options, index_, execution)),
+      sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr) {
     constexpr std::size_t kMostReserved = 1 << 20;
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
     splits_.reserve(std::min(budgetBricks(), kMostReserved) / 8);
@@ -99,6 +127,22 @@ bool BrickScheduler::setFocus(std::vector<Focus> focus) {
     wishes_.focus = std::move(focus);
     replan();
     return true;
+}
+
+void BrickScheduler::setTransferFunction(const std::optional<TransferFunction>& function) {
+    if (!function) {
+        wishes_.visible = nullptr;
+    } else {
+        if (!wishes_.inspector)
+            throw InputError(
+                "this scheduler doesn't look at values: give a transfer function or an error "
+                "bound when it is made");
+        if (function->field != watchedField_)
+            throw InputError("the transfer function is for field " + function->field + ", not " +
+                             watchedField_);
+        wishes_.visible = std::make_shared<const VisibleValues>(*function, wishes_.inspector->watchedRange());
+    }
+    replan();
 }
 
 void BrickScheduler::setBudget(std::int64_t budgetBytes) {
@@ -185,7 +229,7 @@ bool BrickScheduler::fillQueue(Clock::time_point deadline) {
     constexpr std::size_t kAtOnce = 8;
     while (changes_.size() < kAtOnce && hasRoots_) {
         if (!next_) next_ = plan_->next();
-        if (!next_) return false;
+        if (!next_) return !plan_->waitsFor().empty();
         const DepthKey key = bricks_.key(next_->brick);
         // An older plan's change will be shown, or prove to have lost what it stands on: then it is begun
         // anew.
@@ -206,6 +250,7 @@ bool BrickScheduler::publishFinished() {
         changes_.pop_front();
         for (SampledBrick& brick : BrickSampling::take(*change.order)) {
             memory_.add(brick.key, std::move(brick.samples));
+            if (brick.findings) bricks_.setFindings(*bricks_.find(brick.key), std::move(*brick.findings));
             ++counts_.sampled;
         }
         reserved_ -= change.missing;
@@ -311,6 +356,9 @@ bool BrickScheduler::update(Clock::time_point deadline, const Execution& executi
         execution.throwIfCancelled();
         const bool planGoesOn = fillQueue(deadline);
         if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return isAtRest_ = true;
+        TESSERA_CHECK(!changes_.empty() || !planGoesOn || next_ || Clock::now() >= deadline || !hasRoots_ ||
+                          plan_->waitsFor().empty(),
+                      "a plan waits for bricks that nobody samples");
         if (!changes_.empty())
             sampling_.work(deadline, execution, [&] {
                 if (publishFinished()) fillQueue(deadline);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <unordered_set>
 #include <vector>
 
@@ -20,14 +21,17 @@
 #include "tessera/execution.h"
 #include "tessera/mesh.h"
 #include "tessera/resampler.h"
+#include "tessera/transfer_function.h"
 
 namespace tessera {
 
 /// How a scheduler samples; it keeps this as long as it lives.
 struct ScheduleOptions {
-    /// Element size, focus or both; lattice, finest spacing and bounds as for planBricks(). The first focus
-    /// may be given later.
+    /// Element size, focus, error, or several; lattice, finest spacing and bounds as for planBricks(). The
+    /// first focus may be given later.
     RefineOptions refine;
+    /// Not given: everything is seen. Else bricks are refined only where what it shows differs.
+    std::optional<TransferFunction> transferFunction;
     /// Of all bricks in memory, shown, kept for later or being sampled.
     std::int64_t budgetBytes = std::int64_t(1) << 30;
 };
@@ -63,6 +67,8 @@ class BrickScheduler {
     /// Moves the focus: work that waits is dropped, bricks that are being sampled come to their end. False,
     /// and nothing changes, where the difference is too small to be worth new bricks (isJitter()).
     bool setFocus(std::vector<Focus> focus);
+    /// Changes what is seen; the field must be the one that was given first. Throws InputError.
+    void setTransferFunction(const std::optional<TransferFunction>& function);
     /// Drops bricks at once where there are more. Throws InputError when the coarsest don't fit.
     void setBudget(std::int64_t budgetBytes);
 
@@ -79,6 +85,8 @@ class BrickScheduler {
     std::shared_ptr<const Block> samples(const DepthKey& key) const;
     const PlanFrame& frame() const { return bricks_.frame(); }
     const Wishes& wishes() const { return wishes_; }
+    /// What was found out about bricks so far.
+    const MeshBricks& bricks() const { return bricks_; }
     /// The budget holds fewer bricks than are wished for.
     bool isCutShort() const { return plan_ && plan_->isCutShort(); }
 
@@ -125,6 +133,7 @@ class BrickScheduler {
     BrickTarget& target_;
     std::int64_t brickBytes_;
     std::int64_t budgetBytes_;
+    std::string watchedField_;
     Wishes wishes_;
 
     GrowingTree tree_;

@@ -91,11 +91,26 @@ struct Bench {
         MeshBricks bricks(index, frame, bySize ? options.refine.samplesPerElement : 0, {});
         const std::size_t most = std::size_t(budgetBytes / scheduler->brickBytes()) - 8;
         WishPlan plan(bricks, scheduler->wishes(), {PlanLimit::Counts::all, most});
-        plan.complete();
+        do {
+            plan.complete();
+            for (const MeshBricks::Number brick : plan.waitsFor())
+                bricks.setFindings(brick, findingsAlone(bricks.key(brick)));
+        } while (!plan.waitsFor().empty());
         const auto shown = scheduler->tree().leaves(), planned = plan.tree().leaves();
         ASSERT_EQ(shown.size(), planned.size());
         for (std::size_t i = 0; i < shown.size(); ++i) ASSERT_EQ(shown[i].key, planned[i].key);
         EXPECT_EQ(scheduler->isCutShort(), plan.isCutShort());
+    }
+
+    BrickFindings findingsAlone(const DepthKey& key) const {
+        const Lattice lattice = Lattice::axisParallel(frame.originWorld, frame.spacingWorld(key.depth));
+        const IndexBox box{key.index * frame.brickCells, (key.index + 1) * frame.brickCells + 1};
+        BrickFindings findings;
+        const auto inspect = [&](std::size_t, const Block& block) {
+            findings = scheduler->wishes().inspector->inspect(key, block, frame);
+        };
+        bound->resample(lattice, std::span(&box, 1), inspect, {.threads = 1});
+        return findings;
     }
 
     TetMesh mesh;
@@ -114,6 +129,7 @@ ScheduleOptions optionsFor(Criteria criteria, std::int64_t bricks) {
     options.refine.brickCells = 8;
     options.refine.resolution = 200;
     options.refine.focus = {pointFocus({0.3, 0.2, 0.1}, 0.1)};
+    options.refine.maxError = 0.03;
     options.budgetBytes = bricks * 9 * 9 * 9 * 5;
     return options;
 }
@@ -181,9 +197,67 @@ TEST(Schedule, ComingBackSamplesNothing) {
     EXPECT_GT(bench.scheduler->counts().sampled, sampled);
 }
 
+/// Shows values from a to b alone, in shares of the field's range.
+TransferFunction showing(const ValueRange& range, double a, double b) {
+    const double low = range.min + a * (range.max - range.min),
+                 high = range.min + b * (range.max - range.min);
+    const std::array<double, 3> white{1, 1, 1};
+    return {"", {{low, white, 0}, {low, white, 0.5}, {high, white, 0.5}, {high, white, 0}}};
+}
+
+// Measured without the scheduler: no leaf has an error beyond the bound, but at the finest spacing.
+TEST(Schedule, ByErrorEndsWithinTheBound) {
+    ScheduleOptions options = optionsFor(Criterion::error, 100'000);
+    options.refine.maxError = 0.006;
+    Bench bench(ballMesh(8, 1), options);
+    bench.scheduler->finish({.threads = 2});
+    std::size_t fine = 0;
+    for (const GrowingLeaf& leaf : bench.scheduler->tree().leaves()) {
+        const float worst = bench.findingsAlone(leaf.key).worst;
+        EXPECT_TRUE(worst <= 1 || leaf.key.depth == bench.frame.maxDepth) << worst;
+        fine += leaf.key.depth > Depth(0);
+    }
+    EXPECT_GT(fine, 50u);
+}
+
+TEST(Schedule, RefinesOnlyWhatIsSeen) {
+    ScheduleOptions options = optionsFor(Criterion::error, 100'000);
+    options.refine.maxError = 0.01;
+    Bench everything(ballMesh(8, 1), options);
+    everything.scheduler->finish();
+    const std::size_t all = everything.scheduler->tree().leafCount();
+    const ValueRange range = finiteFloatRange(everything.mesh.fields[0], 0);
+    options.transferFunction = showing(range, 0.4, 0.5);
+    Bench bench(ballMesh(8, 1), options);
+    bench.scheduler->finish();
+    bench.expectPlan(bench.budget());
+    const std::size_t tenth = bench.scheduler->tree().leafCount();
+    EXPECT_LT(double(tenth), 0.5 * double(all));
+    EXPECT_GT(tenth, everything.scheduler->bricks().roots().size());
+    // Nothing is seen: nothing beyond the coarsest.
+    bench.scheduler->setTransferFunction(showing(range, 2, 3));
+    bench.scheduler->finish();
+    EXPECT_EQ(bench.scheduler->tree().leafCount(), everything.scheduler->bricks().roots().size());
+    // Everything again, without a sample taken twice.
+    bench.scheduler->setTransferFunction({});
+    bench.scheduler->finish();
+    EXPECT_EQ(bench.scheduler->tree().leafCount(), all);
+    EXPECT_LE(bench.scheduler->counts().sampled, everything.scheduler->counts().sampled);
+    TransferFunction other = showing(range, 0, 1);
+    other.field = "no such field";
+    EXPECT_THROW(bench.scheduler->setTransferFunction(other), InputError);
+    EXPECT_THROW(Bench(ballMesh(4, 1),
+                       [&] {
+                           ScheduleOptions wrong = options;
+                           wrong.transferFunction = other;
+                           return wrong;
+                       }()),
+                 InputError);
+}
+
 TEST(Schedule, RefusesWhatItCannotKeep) {
     EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::focus, 4)), InputError);
-    EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::error, 1000)), InputError);
+    EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::uniform, 1000)), InputError);
     Bench bench(ballMesh(4, 1), optionsFor(Criterion::focus, 1000));
     EXPECT_THROW(bench.scheduler->setBudget(100), InputError);
     EXPECT_THROW(bench.scheduler->setFocus({pointFocus(Vec3d(0), -1)}), InputError);
@@ -193,15 +267,19 @@ TEST(Schedule, RefusesWhatItCannotKeep) {
 
 // Focus jumps and jitter, changes of the budget, cancelled calls and updates of any length, with threads or
 // without.
-void runAtRandom(unsigned seed, int steps, int& cutShort) {
+void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937 random(seed);
     const auto share = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
-    const Criteria criteria =
-        seed % 3 == 0 ? Criterion::elementSize | Criterion::focus : Criteria(Criterion::focus);
+    const bool isSeen = seed % 3 == 1;
+    const Criteria criteria = isSeen          ? Criterion::error | Criterion::focus
+                              : seed % 3 == 0 ? Criterion::elementSize | Criterion::focus
+                                              : Criteria(Criterion::focus);
     ScheduleOptions options = optionsFor(criteria, 400 + std::int64_t(600 * share()));
     options.refine.resolution = seed % 2 == 0 ? 0 : 150;
     if (seed % 5 == 4) options.refine.boundsWorld = Box3d{Vec3d(-0.4, -0.7, 0), Vec3d(0.5, 0.8, 0.9)};
+    const ValueRange range{-1, 2};
+    if (isSeen) options.transferFunction = showing(range, 0.3, 0.6);
     Bench bench(seed % 2 == 0 ? gradedMesh(6, 2) : ballMesh(6, 1), options);
     BrickScheduler& scheduler = *bench.scheduler;
     const Box3d bounds = bench.mesh.boundsWorld();
@@ -229,8 +307,11 @@ void runAtRandom(unsigned seed, int steps, int& cutShort) {
             bench.options.budgetBytes = std::max(bench.options.budgetBytes, bytes);
             scheduler.setBudget(bytes);
             bench.options.budgetBytes = bytes;
-        } else if (what < 0.16) {
+        } else if (what < 0.15) {
             scheduler.forget();
+        } else if (what < 0.16) {
+            const double low = share();
+            if (isSeen) scheduler.setTransferFunction(showing(range, low, low + share()));
         } else if (what < 0.2) {
             cancel = true;
             const auto soon = Clock::now() + std::chrono::milliseconds(1);
@@ -255,8 +336,8 @@ void runAtRandom(unsigned seed, int steps, int& cutShort) {
             cutShort += scheduler.isCutShort();
         }
     }
-    EXPECT_GT(scheduler.counts().dropped, 0);
-    EXPECT_GT(scheduler.counts().reused, 0);
+    sum.dropped += scheduler.counts().dropped;
+    sum.reused += scheduler.counts().reused;
 }
 
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
@@ -267,8 +348,12 @@ TEST(Schedule, EveryPublishedStateIsWhole) {
     };
     const int seeds = number("TESSERA_SCHEDULE_SEEDS", 3), steps = number("TESSERA_SCHEDULE_STEPS", 300);
     int cutShort = 0;
-    for (int seed = 0; seed < seeds && !HasFailure(); ++seed) runAtRandom(unsigned(seed), steps, cutShort);
+    ScheduleCounts sum;
+    for (int seed = 0; seed < seeds && !HasFailure(); ++seed)
+        runAtRandom(unsigned(seed), steps, cutShort, sum);
     EXPECT_GT(cutShort, 0);
+    EXPECT_GT(sum.dropped, 0);
+    EXPECT_GT(sum.reused, 0);
 }
 
 }  // namespace

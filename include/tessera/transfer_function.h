@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace tessera {
+
+/// How a value is shown: colour and opacity, linear between stops and constant beyond the first and the last.
+/// Two stops of one value make a step.
+struct TransferFunction {
+    struct Stop {
+        /// In the field's unit.
+        double value = 0;
+        /// Red, green, blue from 0 to 1, not multiplied by the opacity.
+        std::array<double, 3> color{1, 1, 1};
+        /// From 0, unseen, to 1.
+        double opacity = 0;
+    };
+    /// The field, "" for the first; a vector's first component counts.
+    std::string field;
+    /// Ascending by value, one at least.
+    std::vector<Stop> stops;
+
+    friend bool operator==(const TransferFunction&, const TransferFunction&);
+};
+
+/// Throws InputError for stops out of order or out of range, and for none.
+void checkTransferFunction(const TransferFunction& function);
+
+}  // namespace tessera
