@@ -145,7 +145,8 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
             "--refine", a.refine,
             "uniform: one spacing. element-size: spacing follows the local element size. error: refine until "
             "the measured error is within --max-error. focus: fine around --focus. Several, such as "
-            "element-size,focus: as fine as any of them wishes")
+            "element-size,focus: as fine as any of them wishes; with visibility, only where "
+            "--transfer-function shows what differs")
         ->capture_default_str()
         ->group(group);
     command
@@ -178,6 +179,10 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
         .add_option(
             "--focus", a.focus,
             "focus: a place x,y,z where bricks have the finest spacing (world units); may be repeated")
+        ->group(group);
+    command
+        .add_option("--transfer-function", a.transferFunction,
+                    "visibility: a JSON file of opacities and colours over a field's values")
         ->group(group);
     command
         .add_option("--radius", a.radius,

@@ -12,6 +12,7 @@
 #include "job/algorithm_list.h"
 #include "job/output_paths.h"
 #include "job/series_steps.h"
+#include "job/transfer_function_file.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -100,13 +101,15 @@ Criteria parseCriteria(const std::string& text) {
     std::optional<Criteria> criteria;
     for (const std::string& word : split(text, ',')) {
         std::optional<Criterion> found;
-        for (const Criterion one :
-             {Criterion::uniform, Criterion::elementSize, Criterion::error, Criterion::focus})
+        for (const Criterion one : {Criterion::uniform, Criterion::elementSize, Criterion::error,
+                                    Criterion::focus, Criterion::visibility})
             if (nameOf(one) == word) found = one;
-        require(found.has_value(),
-                fmt::format("--refine: expected uniform, element-size, error, focus, or several separated by "
-                            "commas, got {}",
-                            text));
+        require(
+            found.has_value(),
+            fmt::format(
+                "--refine: expected uniform, element-size, error, focus, visibility, or several separated by "
+                "commas, got {}",
+                text));
         criteria = criteria ? *criteria | *found : Criteria(*found);
     }
     require(criteria.has_value(), "--refine: no criterion given");
@@ -139,6 +142,11 @@ RefineOptions refineOptions(const ResampleArguments& a) {
     }
     require(!a.maxError || r.criterion.has(Criterion::error), "--max-error needs --refine error");
     if (r.criterion.has(Criterion::focus)) r.focus = parseFocus(a);
+    const bool isByVisibility = r.criterion.has(Criterion::visibility);
+    require(isByVisibility != a.transferFunction.empty(),
+            isByVisibility ? "--refine visibility needs --transfer-function tf.json"
+                           : "--transfer-function needs visibility in --refine");
+    if (isByVisibility) r.transferFunction = readTransferFunction(a.transferFunction);
     require(r.criterion.has(Criterion::focus) || (a.focus.empty() && a.radius.empty()),
             "--focus and --radius need --refine focus");
     if (a.maxError) {

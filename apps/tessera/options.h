@@ -53,6 +53,7 @@ struct ResampleArguments {
     std::string format;  ///< of standard output; empty: the default
     std::string refine = "element-size", errorMeasure = "max";
     std::vector<std::string> focus;  ///< "x,y,z" each
+    std::string transferFunction;    ///< a file
     std::vector<double> radius;      ///< one for each focus, or one for all
     std::string times;               ///< "a:b"; empty: all
     std::string fields, errorFields, bounds, maxVoxels;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tessera/focus.h"
+#include "tessera/transfer_function.h"
 #include "tessera/vec.h"
 
 namespace tessera {
@@ -19,7 +20,10 @@ enum class Criterion : unsigned {
     /// Bricks are halved until the measured error is within `maxError`.
     error = 4,
     /// The finest spacing around the places of `focus`, coarser with the distance from them.
-    focus = 8
+    focus = 8,
+    /// Only where the transfer function shows what differs. Beside others: errors then count only where they
+    /// can be seen, and bricks without a value that is seen stay coarse.
+    visibility = 16
 };
 
 /// One criterion, or several combined by |: bricks are then as fine as the one that wishes for the finest.
@@ -27,6 +31,11 @@ class Criteria {
   public:
     constexpr Criteria(Criterion criterion) : bits_(unsigned(criterion)) {}
     constexpr bool has(Criterion criterion) const { return (bits_ & unsigned(criterion)) != 0; }
+    constexpr Criteria without(Criterion criterion) const {
+        Criteria others = *this;
+        others.bits_ &= ~unsigned(criterion);
+        return others;
+    }
     constexpr bool isOnly(Criterion criterion) const { return bits_ == unsigned(criterion); }
     friend constexpr Criteria operator|(Criteria a, Criteria b) {
         a.bits_ |= b.bits_;
@@ -39,7 +48,8 @@ class Criteria {
 constexpr Criteria operator|(Criterion a, Criterion b) {
     return Criteria(a) | Criteria(b);
 }
-/// Words separated by commas: "uniform", "element-size", "error", "focus".
+/// Words separated by commas: "uniform", "element-size", "error", "focus",
+/// "visibility".
 std::string nameOf(Criteria criteria);
 
 /// Which error a bound holds for: the largest of all, or the root of the mean square over the mesh's volume.
@@ -82,6 +92,9 @@ struct BrickOptions {
 
     /// focus: where bricks are to be fine, one place at least.
     std::vector<Focus> focus{};
+
+    /// visibility: what is seen of one of the fields.
+    std::optional<TransferFunction> transferFunction{};
 
     /// Cells along a brick's edge: 8, 16, 32 or 64.
     int brickCells = 16;

@@ -15,7 +15,7 @@
 #include "job/resample_step.h"
 #include "job/series_steps.h"
 #include "refine/plan.h"
-#include "refine/refine.h"
+#include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
 #include "vdb/vdb_metadata.h"
@@ -179,8 +179,8 @@ void ResampleRun::surveySpacing(const TetMesh& mesh) {
     const StepPlan plan = planStep(mesh, request_);
     const FieldSelection& selection = plan.selection;
     const BrickTree tree =
-        plan.refine.criterion.has(Criterion::error)
-            ? refineAndResample(mesh, selection.fields, *choice_.resampler, plan.refine, job_.execution).tree
+        plan.refine.criterion.has(Criterion::error) || plan.refine.criterion.has(Criterion::visibility)
+            ? makeBricks(mesh, selection.fields, *choice_.resampler, plan.refine, job_.execution).tree
             : planBricks(mesh, plan.refine, job_.execution, selection.channels);
     if (!seriesFrame_ || tree.spacingWorld() < seriesFrame_->spacingWorld)
         seriesFrame_ = FixedFrame{tree.originWorld(), tree.spacingWorld()};

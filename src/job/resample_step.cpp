@@ -13,19 +13,25 @@
 #include "refine/measure_error.h"
 #include "refine/plan.h"
 #include "refine/refine.h"
+#include "schedule/schedule_bricks.h"
 
 namespace tessera {
 
 namespace {
+
+/// What decides is known only of samples.
+bool needsSamples(const RefineOptions& options) {
+    return options.criterion.has(Criterion::error) || options.criterion.has(Criterion::visibility);
+}
 
 void dryRun(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler, StepResult& result,
             StageTimes& times, const Execution& execution) {
     Timer timer;
     const FieldSelection& selection = plan.selection;
     BrickResult& bricks = result.bricks;
-    if (plan.refine.criterion.has(Criterion::error)) {
+    if (needsSamples(plan.refine)) {
         // The error decides, and only sampling tells it; nothing is written, and the samples are dropped.
-        bricks = refineAndResample(mesh, selection.fields, resampler, plan.refine, execution);
+        bricks = makeBricks(mesh, selection.fields, resampler, plan.refine, execution);
         bricks.store = {};
     } else {
         bricks.tree = planBricks(mesh, plan.refine, execution, selection.channels, &bricks.notes);
@@ -44,7 +50,7 @@ void dryRun(const TetMesh& mesh, const StepPlan& plan, const Resampler& resample
 void sample(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler, StepResult& result,
             StageTimes& times, const Execution& execution) {
     BrickResult& bricks = result.bricks;
-    bricks = refineAndResample(mesh, plan.selection.fields, resampler, plan.refine, execution);
+    bricks = makeBricks(mesh, plan.selection.fields, resampler, plan.refine, execution);
     times.planMs = bricks.times.planMs;
     times.resampleMs = bricks.times.resampleMs;
     times.verifyMs = bricks.times.verifyMs;
@@ -81,7 +87,7 @@ void write(const ResampleStep& step, const TetMesh& mesh, const StepPlan& plan,
 
 /// The bound is judged by what the file shows.
 void judgeFile(const TetMesh& mesh, const StepPlan& plan, BrickResult& bricks) {
-    if (!plan.refine.criterion.has(Criterion::error) || !bricks.bounded) return;
+    if (!isBoundedEverywhere(plan.refine) || !bricks.bounded) return;
     std::string exceeded = exceededBound(mesh, plan.selection.fields, plan.refine, bricks.report);
     if (exceeded.empty() && bricks.report.incomplete > 0)
         exceeded = fmt::format("{} places beside voxels that it doesn't hold (--extend 1 adds them)",
@@ -135,8 +141,7 @@ std::string stepText(const StepResult& result, const ResampleRequest& request, s
     if (bricks.samplesReport)
         text +=
             "  the samples before they became the file's voxels:\n" + errorText(*bricks.samplesReport, width);
-    if (request.refine.criterion.has(Criterion::error) && bricks.bounded)
-        text += "  the error is within the bound\n";
+    if (isBoundedEverywhere(request.refine) && bricks.bounded) text += "  the error is within the bound\n";
     for (const std::string& note : result.file.notes) text += "  " + note + "\n";
     return text;
 }

@@ -6,7 +6,7 @@
 
 #include "library/brick_parts.h"
 #include "refine/error_samples.h"
-#include "refine/refine.h"
+#include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
 
@@ -33,6 +33,7 @@ RefineOptions refineOptions(const TetMesh& mesh, const ChosenFields& chosen, con
     for (const std::string& name : options.errorFields)
         refine.errorFields.push_back(findField(mesh, chosen.fields, name));
     refine.focus = options.focus;
+    refine.transferFunction = options.transferFunction;
     refine.maxVoxels = options.maxVoxels;
     refine.maxMemoryBytes = options.maxMemoryBytes;
     refine.boundsWorld = options.boundsWorld;
@@ -55,7 +56,7 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->options.fields.clear();
     for (const BrickField& field : parts->chosen.described) parts->options.fields.push_back(field.name);
     parts->result =
-        refineAndResample(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
+        makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
     if (!choice.reason.empty()) parts->result.notes.insert(parts->result.notes.begin(), choice.reason);
     // Names in a mesh needn't be unique.
     for (std::size_t f = 0; f < parts->chosen.described.size(); ++f)
@@ -92,7 +93,7 @@ const ErrorReport& Bricks::report() const {
 }
 
 bool Bricks::isWithinBound() const {
-    return !parts_->options.criterion.has(Criterion::error) || parts_->result.bounded;
+    return !isBoundedEverywhere(parts_->refine) || parts_->result.bounded;
 }
 
 const std::string& Bricks::stoppedBecause() const {

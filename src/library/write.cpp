@@ -90,7 +90,7 @@ VdbWriteOptions writeOptions(const Bricks::Parts& parts, const OutputOptions& op
 
 /// The bound is judged by what the file shows.
 bool isFileWithinBound(const Bricks::Parts& parts, std::vector<std::string>& notes) {
-    const bool isByError = parts.options.criterion.has(Criterion::error);
+    const bool isByError = isBoundedEverywhere(parts.refine);
     if (!isByError || !parts.result.bounded) return !isByError;
     std::string exceeded = exceededBound(*parts.mesh, parts.chosen.fields, parts.refine, parts.result.report);
     if (exceeded.empty() && parts.result.report.incomplete > 0)

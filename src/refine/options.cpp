@@ -10,7 +10,8 @@ std::string nameOf(Criteria criteria) {
     for (const auto& [criterion, name] : {std::pair{Criterion::uniform, "uniform"},
                                           {Criterion::elementSize, "element-size"},
                                           {Criterion::error, "error"},
-                                          {Criterion::focus, "focus"}}) {
+                                          {Criterion::focus, "focus"},
+                                          {Criterion::visibility, "visibility"}}) {
         if (!criteria.has(criterion)) continue;
         if (!names.empty()) names += ',';
         names += name;

@@ -152,6 +152,13 @@ void checkOptions(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions
         require(!options.focus.empty(), "refinement around a focus needs a place");
         checkFocus(options.focus);
     }
+    if (options.criterion.has(Criterion::visibility)) {
+        require(options.transferFunction.has_value(), "refinement by visibility needs a transfer function");
+        checkTransferFunction(*options.transferFunction);
+        require(
+            !options.criterion.isOnly(Criterion::visibility) && !options.criterion.has(Criterion::uniform),
+            "visibility goes with error, element-size or focus: it says where those count");
+    }
     require(!options.criterion.has(Criterion::uniform) || options.criterion.isOnly(Criterion::uniform),
             "a uniform spacing goes with no other criterion");
     if (options.frame)
@@ -183,7 +190,7 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     frame.boundsWorld = options.boundsWorld;
     frame.meshBoundsWorld = meshBox;
     frame.originWorld = options.frame ? options.frame->originWorld : box.min;
-    const Criteria criteria = options.criterion;
+    const Criteria criteria = options.criterion.without(Criterion::visibility);
     const int levels = options.maxLevels > 0 ? options.maxLevels
                        : criteria.has(Criterion::elementSize) && !criteria.has(Criterion::error)
                            ? kDefaultLevels

@@ -23,7 +23,8 @@ struct RefineOptions {
     ErrorMeasure measure = ErrorMeasure::max;
     std::vector<int>
         errorFields;  ///< indices into mesh.fields that the bound holds for; empty: all point fields chosen
-    std::vector<Focus> focus;  ///< focus: where bricks are to be fine
+    std::vector<Focus> focus;                          ///< focus: where bricks are to be fine
+    std::optional<TransferFunction> transferFunction;  ///< visibility: what is seen
     std::int64_t maxVoxels =
         0;  ///< bound on stored points (leaves x B^3); 0: a default from the memory there is
     std::int64_t maxMemoryBytes = 0;   ///< bound on the samples' memory; 0: no bound of its own
@@ -32,5 +33,10 @@ struct RefineOptions {
                                        ///< even when no brick is so fine
     BindOptions bind;                  ///< what the resampler runs with
 };
+
+/// Whether the largest errors of all values must be within the bound, not only of those that are seen.
+inline bool isBoundedEverywhere(const RefineOptions& options) {
+    return options.criterion.has(Criterion::error) && !options.criterion.has(Criterion::visibility);
+}
 
 }  // namespace tessera

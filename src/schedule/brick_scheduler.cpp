@@ -30,11 +30,10 @@ PlanFrame frameOf(const TetMesh& mesh, const ScheduleOptions& options, const Ele
     return chooseFrame(box, refine);
 }
 
-std::int64_t bytesOfBrick(const TetMesh& mesh, std::span<const int> fields, int cells) {
-    std::int64_t channels = 0;
+int channelsOf(const TetMesh& mesh, std::span<const int> fields) {
+    int channels = 0;
     for (const int f : fields) channels += mesh.fields.at(std::size_t(f)).components;
-    const std::int64_t edge = cells + 1;
-    return edge * edge * edge * (std::int64_t(sizeof(float)) * channels + 1);
+    return channels;
 }
 
 BindOptions bindOptions(const ScheduleOptions& options, std::shared_ptr<const SharedElementIndex> index) {
@@ -86,6 +85,11 @@ std::vector<DepthKey> childrenOf(const DepthKey& key, ChildBits children) {
 
 }  // namespace
 
+std::int64_t bytesOfBrick(int channels, int brickCells) {
+    const std::int64_t edge = brickCells + 1;
+    return edge * edge * edge * (std::int64_t(sizeof(float)) * channels + 1);
+}
+
 BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
                                const ScheduleOptions& options, BrickTarget& target,
                                const Execution& execution)
@@ -95,7 +99,7 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
               options.refine.criterion.has(Criterion::elementSize) ? options.refine.samplesPerElement : 0,
               execution),
       target_(target),
-      brickBytes_(bytesOfBrick(mesh, fields, options.refine.brickCells)),
+      brickBytes_(bytesOfBrick(channelsOf(mesh, fields), options.refine.brickCells)),
       budgetBytes_(options.budgetBytes),
       watchedField_(options.transferFunction ? options.transferFunction->field : ""),
       wishes_(firstWishes(mesh, fields, options, index_, execution)),

@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <unordered_set>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct ScheduleOptions {
     /// Of all bricks in memory, shown, kept for later or being sampled.
     std::int64_t budgetBytes = std::int64_t(1) << 30;
 };
+
+/// Of the samples of a brick's closed box.
+std::int64_t bytesOfBrick(int channels, int brickCells);
 
 /// What a scheduler has done so far.
 struct ScheduleCounts {
@@ -96,6 +100,8 @@ class BrickScheduler {
     /// The least budget: the coarsest bricks and one change.
     std::int64_t leastBudgetBytes() const;
     const ScheduleCounts& counts() const { return counts_; }
+    /// The code path that samples, one of Resampler::targets().
+    std::string_view resamplerTarget() const { return bound_->target(); }
     const ResampleStatistics& statistics() const { return sampling_.statistics(); }
     /// Drops all bricks that aren't shown.
     void forget();

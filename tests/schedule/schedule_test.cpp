@@ -8,6 +8,7 @@
 
 #include "brick_test_meshes.h"
 #include "refine/plan_frame.h"
+#include "schedule/schedule_bricks.h"
 #include "schedule/watched_bricks.h"
 #include "software/software_resampler.h"
 #include "tessera/error.h"
@@ -265,6 +266,65 @@ TEST(Schedule, RefusesWhatItCannotKeep) {
     bench.expectPlan(bench.budget());
 }
 
+int asked(const char* name, int otherwise) {
+    const char* text = std::getenv(name);
+    return text ? std::atoi(text) : otherwise;
+}
+
+// Reads a linear field on both sides of faces between leaves, in a state of work half done.
+// TESSERA_SCHEDULE_FACES asks for more places.
+TEST(Schedule, LinearFieldsHaveNoStepBetweenLeaves) {
+    TetMesh mesh = ballMesh(6, 1);
+    const Vec3d slope(0.7, -1.3, 0.4);
+    addPointField(mesh, "linear", [&](const Vec3d& p) { return glm::dot(slope, p) + 2; });
+    const std::vector<int> fields{0};
+    const SoftwareResampler resampler;
+    const auto bound = resampler.bind(mesh, fields, {});
+    const ScheduleOptions options = optionsFor(Criterion::focus, 3000);
+    WatchedBricks target(*bound, chooseFrame(mesh.boundsWorld(), options.refine));
+    BrickScheduler scheduler(mesh, fields, resampler, options, target);
+    std::mt19937 random(5);
+    const auto share = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
+    const int states = 10, places = asked("TESSERA_SCHEDULE_FACES", 20'000) / states;
+    const NearestOnDemand nearest(mesh, 1);
+    int compared = 0, acrossLevels = 0;
+    for (int state = 0; state < states; ++state) {
+        scheduler.finish();
+        scheduler.setFocus({pointFocus(Vec3d(share(), share(), share()) - 0.5, 0.05)});
+        for (int i = 0; i < 20 * state; ++i) scheduler.update(Clock::now());
+        const BricksShown shown = bricksOf(scheduler, scheduler.tree().deepest());
+        const BrickTree& tree = shown.tree;
+        const Reconstruction reconstruction(mesh, fields, tree, shown.store, nearest);
+        for (int n = 0; n < places; ++n) {
+            const std::size_t leaf = std::size_t(share() * double(tree.leafCount()));
+            const BrickKey key = tree.leaves()[leaf];
+            // On the face towards an axis, as an index of the leaf's level.
+            const int axis = int(3 * share()), side = share() < 0.5 ? 0 : 1;
+            Vec3d index = (Vec3d(key.index) + Vec3d(share(), share(), share())) * 8.0;
+            index[axis] = (key.index[axis] + side) * 8.0;
+            BrickKey beside{key.level, key.index};
+            beside.index[axis] += side ? 1 : -1;
+            const std::int64_t other = tree.findCovering(beside);
+            if (other < 0) continue;
+            const BrickKey& far = tree.leaves()[std::size_t(other)];
+            int coveredHere = 0, coveredThere = 0;
+            const double here = reconstruction.interpolate(leaf, index, 0, &coveredHere);
+            const double there = reconstruction.interpolate(
+                std::size_t(other), index * std::ldexp(1.0, key.level - far.level), 0, &coveredThere);
+            if (coveredHere < 8 || coveredThere < 8) continue;
+            const Vec3d place = tree.originWorld() + index * tree.spacingWorld(key.level);
+            // A unit in the last place of the values, which lie between 2 and 4 at most.
+            constexpr double kUlp = 0x1p-22;
+            ASSERT_NEAR(here, there, 4 * kUlp);
+            ASSERT_NEAR(here, glm::dot(slope, place) + 2, 4 * kUlp);
+            ++compared;
+            acrossLevels += far.level != key.level;
+        }
+    }
+    EXPECT_GT(compared, states * places / 4);
+    EXPECT_GT(acrossLevels, compared / 20);
+}
+
 // Focus jumps and jitter, changes of the budget, cancelled calls and updates of any length, with threads or
 // without.
 void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
@@ -342,11 +402,7 @@ void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
 
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
 TEST(Schedule, EveryPublishedStateIsWhole) {
-    const auto number = [](const char* name, int otherwise) {
-        const char* text = std::getenv(name);
-        return text ? std::atoi(text) : otherwise;
-    };
-    const int seeds = number("TESSERA_SCHEDULE_SEEDS", 3), steps = number("TESSERA_SCHEDULE_STEPS", 300);
+    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", 3), steps = asked("TESSERA_SCHEDULE_STEPS", 300);
     int cutShort = 0;
     ScheduleCounts sum;
     for (int seed = 0; seed < seeds && !HasFailure(); ++seed)
