@@ -2,7 +2,7 @@ add_library(hard_cases STATIC hard_cases/hard_meshes.cpp hard_cases/hard_cases.c
 target_link_libraries(hard_cases PUBLIC contract_suite tessera_registry PRIVATE tessera_flags)
 tessera_precompile(hard_cases)
 
-tessera_test(hard_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
+tessera_test(hard_cases_test FOLDER hard_cases OPTIMISED LINK reference registry PRIVATE_LINK hard_cases)
 tessera_test(perturbed_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
 tessera_test(repair_hard_cases_test FOLDER hard_cases LINK reference registry PRIVATE_LINK hard_cases)
 set_tests_properties(repair_hard_cases_test hard_cases_test perturbed_cases_test PROPERTIES TIMEOUT 900)

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "base/check.h"
 
@@ -46,64 +47,91 @@ Split split(double value) {
     return {mantissa >> zeros, exponent - 53 + zeros};
 }
 
-/// Turns doubles into integers by one common power of two.
-class Scale {
-  public:
-    void include(const Vec3d& v) {
-        for (int a = 0; a < 3; ++a) {
-            const Split s = split(v[a]);
-            if (s.mantissa != 0) lowest_ = std::min(lowest_, s.exponent);
-        }
+/// The lowest exponent of any of their bits.
+int lowestExponent(const Vec3d& v) {
+    int lowest = 4096;
+    for (int a = 0; a < 3; ++a) {
+        const Split s = split(v[a]);
+        if (s.mantissa != 0) lowest = std::min(lowest, s.exponent);
     }
-    ExactVec operator()(const Vec3d& v) const { return {scaled(v.x), scaled(v.y), scaled(v.z)}; }
+    return lowest;
+}
 
-  private:
-    mpz_class scaled(double value) const {
-        const Split s = split(value);
-        mpz_class result = long(s.mantissa);
-        if (s.mantissa != 0) result <<= mp_bitcnt_t(s.exponent - lowest_);
-        return result;
-    }
-    int lowest_ = 4096;
-};
+mpz_class scaledBy(double value, int lowestExponent) {
+    const Split s = split(value);
+    mpz_class result = long(s.mantissa);
+    if (s.mantissa != 0) result <<= mp_bitcnt_t(s.exponent - lowestExponent);
+    return result;
+}
+
+/// (place - origin) / spacing: two roundings of 2^-53 each; nothing where the quotient leaves the range in
+/// which that holds.
+std::optional<double> roundedIndex(double place, double origin, double spacing) {
+    const double difference = place - origin, index = difference / spacing;
+    if (difference != 0 && !(std::abs(index) > 1e-290 && std::isfinite(index))) return std::nullopt;
+    return index;
+}
+
+/// Of larger meshes few nodes are asked for; to convert all would take longer than the answers.
+constexpr std::size_t kMostStored = 200'000;
 
 }  // namespace
 
-ExactFrame::ExactFrame(const TetMesh& mesh, const Lattice& lattice) {
+ExactFrame::ExactFrame(const TetMesh& mesh, const Lattice& lattice) : mesh_(&mesh), lowestExponent_(4096) {
     std::vector<std::uint8_t> used(mesh.points.size(), 0);
     for (const auto& tet : mesh.tets)
         for (const std::int32_t n : tet) used[std::size_t(n)] = 1;
 
-    Scale scale;
     for (const Vec3d& v : {lattice.originWorld, lattice.uWorld, lattice.vWorld, lattice.wWorld})
-        scale.include(v);
+        lowestExponent_ = std::min(lowestExponent_, lowestExponent(v));
     for (std::size_t n = 0; n < used.size(); ++n)
-        if (used[n]) scale.include(mesh.points[n]);
+        if (used[n]) lowestExponent_ = std::min(lowestExponent_, lowestExponent(mesh.points[n]));
 
-    const ExactVec origin = scale(lattice.originWorld);
-    const ExactVec u = scale(lattice.uWorld), v = scale(lattice.vWorld), w = scale(lattice.wWorld);
-    ExactVec rowX = cross(v, w), rowY = cross(w, u), rowZ = cross(u, v);
-    unit_ = dot(u, rowX);
+    origin_ = scaled(lattice.originWorld);
+    const ExactVec u = scaled(lattice.uWorld), v = scaled(lattice.vWorld), w = scaled(lattice.wWorld);
+    rows_ = {cross(v, w), cross(w, u), cross(u, v)};
+    unit_ = dot(u, rows_[0]);
     TESSERA_CHECK(unit_ != 0, "the lattice's frame vectors are linearly dependent");
-    const bool isCubic = lattice.isAxisParallel() && u.x == v.y && u.x == w.z;
-    if (isCubic) {  // the same space with numbers a third as long
-        unit_ = u.x;
-        rowX = {1, 0, 0}, rowY = {0, 1, 0}, rowZ = {0, 0, 1};
-    }
+    isCubic_ = lattice.isAxisParallel() && u.x == v.y && u.x == w.z;
+    if (isCubic_) unit_ = u.x;
     if (unit_ < 0) {
         unit_ = -unit_;
-        for (ExactVec* row : {&rowX, &rowY, &rowZ}) *row = {-row->x, -row->y, -row->z};
+        for (ExactVec& row : rows_) row = {-row.x, -row.y, -row.z};
     }
 
-    nodes_.resize(used.size());
+    const bool isStored = !isCubic_ || used.size() <= kMostStored;
+    if (isStored) nodes_.resize(used.size());
     indexNodes_.resize(used.size());
     for (std::size_t n = 0; n < used.size(); ++n) {
         if (!used[n]) continue;
-        const ExactVec p = scale(mesh.points[n]) - origin;
-        nodes_[n] = isCubic ? p : ExactVec{dot(rowX, p), dot(rowY, p), dot(rowZ, p)};
-        indexNodes_[n] = {approximateRatio(nodes_[n].x, unit_), approximateRatio(nodes_[n].y, unit_),
-                          approximateRatio(nodes_[n].z, unit_)};
+        if (isStored) nodes_[n] = exactNode(std::int32_t(n));
+        for (int a = 0; a < 3; ++a) {
+            std::optional<double> index;
+            if (isCubic_) index = roundedIndex(mesh.points[n][a], lattice.originWorld[a], lattice.uWorld.x);
+            if (!index) {
+                const ExactVec exact = node(std::int32_t(n));
+                index = approximateRatio(a == 0 ? exact.x : a == 1 ? exact.y : exact.z, unit_);
+            }
+            indexNodes_[n][a] = *index;
+        }
     }
+}
+
+ExactVec ExactFrame::scaled(const Vec3d& v) const {
+    return {scaledBy(v.x, lowestExponent_), scaledBy(v.y, lowestExponent_), scaledBy(v.z, lowestExponent_)};
+}
+
+ExactVec ExactFrame::exactNode(std::int32_t n) const {
+    const ExactVec p = scaled(mesh_->points[std::size_t(n)]) - origin_;
+    return isCubic_ ? p : ExactVec{dot(rows_[0], p), dot(rows_[1], p), dot(rows_[2], p)};
+}
+
+ExactVec ExactFrame::node(std::int32_t n) const {
+    return nodes_.empty() ? exactNode(n) : nodes_[std::size_t(n)];
+}
+
+ExactVec ExactFrame::nodeFrom(std::int32_t n, const ExactVec& origin) const {
+    return nodes_.empty() ? exactNode(n) - origin : nodes_[std::size_t(n)] - origin;
 }
 
 ExactVec ExactFrame::latticePoint(const Vec3i& p) const {

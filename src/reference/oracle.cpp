@@ -31,8 +31,8 @@ Oracle::Oracle(const TetMesh& mesh, const Lattice& lattice)
 
 Oracle::Corners Oracle::cornersFrom(std::int64_t element, const ExactVec& origin) const {
     const auto& tet = mesh_->tets[std::size_t(element)];
-    return {{frame_.node(tet[0]) - origin, frame_.node(tet[1]) - origin, frame_.node(tet[2]) - origin,
-             frame_.node(tet[3]) - origin}};
+    return {{frame_.nodeFrom(tet[0], origin), frame_.nodeFrom(tet[1], origin),
+             frame_.nodeFrom(tet[2], origin), frame_.nodeFrom(tet[3], origin)}};
 }
 
 int Oracle::volumeSign(std::int64_t element) const {

@@ -25,6 +25,9 @@ inline void PrintTo(const MeshCase& meshCase, std::ostream* out) {
 }
 const std::vector<MeshCase>& meshCases();
 
+/// Keeps the mesh: some take longer to make than to sample, and every subject takes each of them.
+std::function<TetMesh()> madeOnce(std::function<TetMesh()> make);
+
 struct LatticeCase {
     std::string name;
     Lattice lattice;

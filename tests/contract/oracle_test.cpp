@@ -191,6 +191,37 @@ TEST(Oracle, FlatElementsHaveNoVolume) {
     for (std::int64_t e = 0; e < mesh.elementCount(); ++e) EXPECT_EQ(oracle.volumeSign(e) != 0, e < proper);
 }
 
+TEST(ExactFrame, GivesTheSameNodesWhetherTheyAreStoredOrNot) {
+    TetMesh mesh;
+    Random random(71);
+    for (int n = 0; n < 400; ++n)
+        mesh.points.push_back({random.centred(), 1e-9 * random.centred(), 1e6 + random.centred()});
+    // Beside the origin of the lattice; on it; so near that the quotient is no normal number.
+    mesh.points[0] = {0.1, 0.2, 1e6};
+    mesh.points[1] = {0x1p-1060, -0x1p-1073, 0x1p-1020};
+    for (std::int32_t n = 0; n < 400; n += 4) mesh.tets.push_back({n, n + 1, n + 2, n + 3});
+    TetMesh many = mesh;
+    many.points.resize(300'000, Vec3d(0));  // of no element
+    for (const Lattice& lattice :
+         {Lattice::axisParallel({0.1, 0.2, 1e6}, 0.1), Lattice::axisParallel(Vec3d(0), 0x1p20)}) {
+        const ExactFrame stored(mesh, lattice), computed(many, lattice);
+        EXPECT_EQ(stored.unit(), computed.unit());
+        for (std::int32_t n = 0; n < 400; ++n) {
+            const ExactVec a = stored.node(n), b = computed.node(n);
+            ASSERT_TRUE(a.x == b.x && a.y == b.y && a.z == b.z) << n;
+            ASSERT_EQ(stored.indexNode(n), computed.indexNode(n)) << n;
+            const ExactVec zero = stored.nodeFrom(n, b);
+            ASSERT_TRUE(zero.x == 0 && zero.y == 0 && zero.z == 0) << n;
+            const mpz_class* exact[] = {&a.x, &a.y, &a.z};
+            for (int axis = 0; axis < 3; ++axis) {
+                const mpq_class wanted(mpq_class(*exact[axis]) / stored.unit());
+                const mpq_class error = abs(mpq_class(mpq_class(stored.indexNode(n)[axis]) - wanted));
+                ASSERT_LE(error, abs(wanted) * mpq_class(0x1p-50) + mpq_class(0x1p-1074)) << n;
+            }
+        }
+    }
+}
+
 TEST(ReferenceBlock, CountsTheClosedBox) {
     const TetMesh mesh = boxMesh({.cells = {3, 3, 3}, .sizeWorld = {6, 6, 6}});
     const auto inMesh = [&](const Vec3d& origin) {

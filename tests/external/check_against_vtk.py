@@ -46,7 +46,8 @@ class Tets:
         self.points = vtk_to_numpy(self.grid.GetPoints().GetData()).astype(float)
         self.tets = vtk_to_numpy(self.grid.GetCells().GetConnectivityArray()).reshape(-1, 4)
         corners = self.points[self.tets]
-        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
+        # A row for each axis, so that looking along one reads what lies side by side.
+        self.low, self.high = np.ascontiguousarray(corners.min(axis=1).T), np.ascontiguousarray(corners.max(axis=1).T)
         self.fields = {}
         for location, data in (("point", self.grid.GetPointData()), ("cell", self.grid.GetCellData())):
             for i in range(data.GetNumberOfArrays()):
@@ -86,7 +87,9 @@ class Tets:
 
     def around(self, place, margin):
         """Elements within `margin` of a place so far as their four sides tell: indices, weights, signed depths, gradients of the weights."""
-        near = np.flatnonzero(((self.low <= place + margin) & (self.high >= place - margin)).all(axis=1))
+        near = np.flatnonzero((self.low[0] <= place[0] + margin) & (self.high[0] >= place[0] - margin))
+        for axis in (1, 2):
+            near = near[(self.low[axis][near] <= place[axis] + margin) & (self.high[axis][near] >= place[axis] - margin)]
         p = self.points[self.tets[near]] - place
         weights = np.empty((len(near), 4))
         gradients = np.empty((len(near), 4, 3))

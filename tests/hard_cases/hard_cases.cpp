@@ -32,7 +32,11 @@ TetMesh withFields(TetMesh mesh) {
 
 class Gallery {
   public:
-    std::vector<HardCase> take() { return std::move(cases_); }
+    std::vector<HardCase> take() {
+        for (HardCase& hardCase : cases_)
+            if (!hardCase.isLarge) hardCase.make = contract::madeOnce(std::move(hardCase.make));
+        return std::move(cases_);
+    }
 
     /// The cases that follow stand in this row.
     Gallery& row(std::string name, std::string sentence) {
