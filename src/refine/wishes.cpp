@@ -15,7 +15,7 @@ namespace {
 constexpr double kJitterShare = 1.0 / 16;
 constexpr double kJitterSpacings = 2;
 
-bool finite(const Vec3d& v) {
+bool isFinite(const Vec3d& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
@@ -59,7 +59,7 @@ bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld) {
 
 void checkFocus(std::span<const Focus> focus) {
     for (const Focus& one : focus) {
-        if (!finite(one.boxWorld.min) || !finite(one.boxWorld.max) || one.boxWorld.empty())
+        if (!isFinite(one.boxWorld.min) || !isFinite(one.boxWorld.max) || one.boxWorld.empty())
             throw InputError("a focus must be a place with finite coordinates, or a box with min below max");
         if (!std::isfinite(one.radiusWorld) || !(one.radiusWorld > 0))
             throw InputError("the radius of a focus must be positive, not " +

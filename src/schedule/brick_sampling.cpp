@@ -62,10 +62,17 @@ std::shared_ptr<const Block> cut(const Block& from, const IndexBox& box) {
 }  // namespace
 
 BrickSampling::BrickSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
-                             const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector)
-    : bound_(bound), index_(std::move(index)), frame_(frame), inspector_(std::move(inspector)) {}
+                             const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector,
+                             int threads)
+    : bound_(bound), index_(std::move(index)), frame_(frame), inspector_(std::move(inspector)) {
+    for (int t = 0; t < threads; ++t)
+        threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
+}
 
-BrickSampling::~BrickSampling() = default;
+BrickSampling::~BrickSampling() {
+    for (std::jthread& thread : threads_) thread.request_stop();
+    threads_.clear();
+}
 
 std::shared_ptr<BrickSampling::Order> BrickSampling::order(std::span<const std::vector<DepthKey>> together) {
     auto order = std::make_shared<Order>();
@@ -97,53 +104,71 @@ std::shared_ptr<BrickSampling::Order> BrickSampling::order(std::span<const std::
     order->left = order->tasks.size();
     const std::lock_guard lock(mutex_);
     if (order->left > 0) queue_.push_back(order);
+    changed_.notify_all();
     return order;
 }
 
-bool BrickSampling::isDone(const Order& order) {
+bool BrickSampling::isDone(const Order& order) const {
+    const std::lock_guard lock(mutex_);
     return order.left == 0;
 }
 
-bool BrickSampling::hasBegun(const Order& order) {
+bool BrickSampling::hasBegun(const Order& order) const {
+    const std::lock_guard lock(mutex_);
     return std::any_of(order.tasks.begin(), order.tasks.end(),
                        [](const std::shared_ptr<Task>& task) { return task->hasBegun; });
 }
 
 std::vector<SampledBrick> BrickSampling::take(Order& order) {
-    TESSERA_CHECK(isDone(order), "bricks are taken before they are sampled");
+    const std::lock_guard lock(mutex_);
+    TESSERA_CHECK(order.left == 0, "bricks are taken before they are sampled");
     return std::move(order.sampled);
 }
 
-void BrickSampling::drop(const Order& order) {
+ResampleStatistics BrickSampling::statistics() const {
     const std::lock_guard lock(mutex_);
+    return statistics_;
+}
+
+void BrickSampling::drop(const Order& order) {
+    std::unique_lock lock(mutex_);
     std::erase_if(queue_, [&](const std::shared_ptr<Order>& queued) { return queued.get() == &order; });
+    changed_.wait(lock, [&] {
+        return std::none_of(order.tasks.begin(), order.tasks.end(),
+                            [](const std::shared_ptr<Task>& task) { return task->isRunning; });
+    });
 }
 
 // The first that no thread is at.
-std::shared_ptr<BrickSampling::Task> BrickSampling::nextTask() {
+BrickSampling::Taken BrickSampling::nextTask() {
     for (const std::shared_ptr<Order>& order : queue_)
         for (const std::shared_ptr<Task>& task : order->tasks)
             if (!task->isDone && !task->isRunning) {
                 task->isRunning = task->hasBegun = true;
                 ++running_;
-                return task;
+                return {order, task};
             }
-    return nullptr;
+    return {};
 }
 
-void BrickSampling::endPiece(const std::shared_ptr<Task>& task, bool isDone) {
+void BrickSampling::endPiece(const Taken& taken, bool isDone) {
     --running_;
-    task->isRunning = false;
-    task->isDone = isDone;
+    Task& task = *taken.task;
+    task.isRunning = false;
+    task.isDone = isDone;
+    changed_.notify_all();
     if (!isDone) return;
-    statistics_ += task->sampling->statistics();
-    task->sampling.reset();
-    const auto order = std::find_if(queue_.begin(), queue_.end(), [&](const std::shared_ptr<Order>& queued) {
-        return std::find(queued->tasks.begin(), queued->tasks.end(), task) != queued->tasks.end();
-    });
-    if (order == queue_.end() || --(*order)->left > 0) return;
-    queue_.erase(order);
+    statistics_ += task.sampling->statistics();
+    task.sampling.reset();
+    if (--taken.order->left > 0) return;
+    std::erase(queue_, taken.order);
     anyDone_ = true;
+}
+
+// Without the lock; true when the task is done.
+bool BrickSampling::step(const Taken& taken, std::int64_t elements, const Execution& execution) {
+    execution.throwIfCancelled();
+    return taken.task->sampling->step(elements, execution);
 }
 
 /// The threads of one call of work().
@@ -169,7 +194,7 @@ class BrickSampling::Crew {
     void end() {
         const std::lock_guard lock(sampling_.mutex_);
         hasEnded_ = true;
-        changed_.notify_all();
+        sampling_.changed_.notify_all();
     }
     bool isLate() const { return Clock::now() >= deadline_; }
 
@@ -181,10 +206,9 @@ class BrickSampling::Crew {
             lock.unlock();
             whenDone_();
             lock.lock();
-            changed_.notify_all();
             if (hasGone_ || isLate()) return false;
         }
-        if (const auto task = sampling_.nextTask()) return piece(task, lock);
+        if (const Taken taken = sampling_.nextTask()) return piece(taken, lock);
         if (sampling_.running_ == 0 && !sampling_.anyDone_) return false;
         wait(lock);
         return !isLate();
@@ -193,7 +217,7 @@ class BrickSampling::Crew {
     bool followOn() {
         std::unique_lock lock(sampling_.mutex_);
         if (hasEnded_) return false;
-        if (const auto task = sampling_.nextTask()) return piece(task, lock);
+        if (const Taken taken = sampling_.nextTask()) return piece(taken, lock);
         // Nobody but the caller gives work, and it may not be among these threads.
         hasGone_ = sampling_.running_ == 0;
         if (hasGone_) return false;
@@ -202,23 +226,22 @@ class BrickSampling::Crew {
     }
 
     void wait(std::unique_lock<std::mutex>& lock) {
-        changed_.wait_until(lock, std::min(deadline_, Clock::now() + std::chrono::milliseconds(20)));
+        sampling_.changed_.wait_until(lock,
+                                      std::min(deadline_, Clock::now() + std::chrono::milliseconds(20)));
     }
 
-    bool piece(const std::shared_ptr<Task>& task, std::unique_lock<std::mutex>& lock) {
+    bool piece(const Taken& taken, std::unique_lock<std::mutex>& lock) {
         lock.unlock();
         bool isDone = false;
         try {
-            execution_.throwIfCancelled();
-            isDone = task->sampling->step(pieceElements(deadline_ - Clock::now()), execution_);
+            isDone = sampling_.step(taken, pieceElements(deadline_ - Clock::now()), execution_);
         } catch (...) {
             lock.lock();
-            sampling_.endPiece(task, false);
+            sampling_.endPiece(taken, false);
             throw;
         }
         lock.lock();
-        sampling_.endPiece(task, isDone);
-        if (isDone) changed_.notify_all();
+        sampling_.endPiece(taken, isDone);
         return !hasEnded_ && !isLate();
     }
 
@@ -227,12 +250,63 @@ class BrickSampling::Crew {
     Execution execution_;
     const std::function<void()>& whenDone_;
     std::thread::id caller_ = std::this_thread::get_id();
-    std::condition_variable changed_;
     bool hasEnded_ = false, hasGone_ = false;
 };
 
+// A thread of its own. Pieces are short, so that an order that is dropped isn't waited for.
+void BrickSampling::serve(const std::stop_token& stop) {
+    const Execution single{.threads = 1};
+    std::unique_lock lock(mutex_);
+    while (!stop.stop_requested()) {
+        const Taken taken = failure_ ? Taken{} : nextTask();
+        if (!taken) {
+            changed_.wait(lock, stop, [&] { return !failure_ && hasTask(); });
+            continue;
+        }
+        lock.unlock();
+        bool isDone = false;
+        std::exception_ptr failure;
+        try {
+            isDone = step(taken, 2 * StoppableSampling::kPieceElements, single);
+        } catch (...) {
+            failure = std::current_exception();
+        }
+        lock.lock();
+        if (failure) failure_ = failure;
+        endPiece(taken, isDone);
+    }
+}
+
+bool BrickSampling::hasTask() const {
+    for (const std::shared_ptr<Order>& order : queue_)
+        for (const std::shared_ptr<Task>& task : order->tasks)
+            if (!task->isDone && !task->isRunning) return true;
+    return false;
+}
+
+void BrickSampling::waitForThreads(Clock::time_point deadline, const Execution& execution,
+                                   const std::function<void()>& whenDone) {
+    std::unique_lock lock(mutex_);
+    while (true) {
+        if (failure_) {
+            changed_.notify_all();
+            std::rethrow_exception(std::exchange(failure_, nullptr));
+        }
+        if (std::exchange(anyDone_, false)) {
+            lock.unlock();
+            whenDone();
+            lock.lock();
+            continue;
+        }
+        if (queue_.empty() || Clock::now() >= deadline) return;
+        changed_.wait_until(lock, std::min(deadline, Clock::now() + std::chrono::milliseconds(20)));
+        execution.throwIfCancelled();
+    }
+}
+
 void BrickSampling::work(Clock::time_point deadline, const Execution& execution,
                          const std::function<void()>& whenDone) {
+    if (!threads_.empty()) return waitForThreads(deadline, execution, whenDone);
     Execution single = execution.withoutProgress();
     single.threads = 1;
     Crew crew(*this, deadline, single, whenDone);

@@ -103,7 +103,8 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       budgetBytes_(options.budgetBytes),
       watchedField_(options.transferFunction ? options.transferFunction->field : ""),
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
-      sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr) {
+      sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
+                options.threads) {
     constexpr std::size_t kMostReserved = 1 << 20;
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
     splits_.reserve(std::min(budgetBricks(), kMostReserved) / 8);
@@ -171,7 +172,7 @@ void BrickScheduler::replan() {
     hasRanked_ = isAtRest_ = false;
     ++planNumber_;
     // Orders are begun one after the other, so those that wait are the last.
-    while (!changes_.empty() && changes_.back().split && !BrickSampling::hasBegun(*changes_.back().order)) {
+    while (!changes_.empty() && changes_.back().split && !sampling_.hasBegun(*changes_.back().order)) {
         abandon(changes_.back());
         changes_.pop_back();
     }
@@ -249,10 +250,10 @@ bool BrickScheduler::fillQueue(Clock::time_point deadline) {
 
 bool BrickScheduler::publishFinished() {
     bool any = false;
-    while (!changes_.empty() && BrickSampling::isDone(*changes_.front().order)) {
+    while (!changes_.empty() && sampling_.isDone(*changes_.front().order)) {
         Change change = std::move(changes_.front());
         changes_.pop_front();
-        for (SampledBrick& brick : BrickSampling::take(*change.order)) {
+        for (SampledBrick& brick : sampling_.take(*change.order)) {
             memory_.add(brick.key, std::move(brick.samples));
             if (brick.findings) bricks_.setFindings(*bricks_.find(brick.key), std::move(*brick.findings));
             ++counts_.sampled;

@@ -35,6 +35,8 @@ struct ScheduleOptions {
     std::optional<TransferFunction> transferFunction;
     /// Of all bricks in memory, shown, kept for later or being sampled.
     std::int64_t budgetBytes = std::int64_t(1) << 30;
+    /// Threads of its own, which sample between calls too; 0: all work is done in update().
+    int threads = 0;
 };
 
 /// Of the samples of a brick's closed box.
@@ -53,7 +55,8 @@ struct ScheduleCounts {
 /// cover the domain once, any two that touch differ by at most one depth, and each has all its samples. The
 /// coarsest bricks come first and never go.
 ///
-/// Its work is done in update(), by as many threads as that is given; everything else is for the same thread.
+/// Its work is done in update(), by as many threads as that is given, or by threads of its own; what they
+/// have done is shown in update() or publish(). All calls are for one thread.
 /// What it shows at rest depends on the mesh, the wishes and the budget alone: it is the plan that WishPlan
 /// makes.
 class BrickScheduler {
@@ -80,6 +83,8 @@ class BrickScheduler {
     /// True at rest: what is shown is the plan. When it throws, what is shown stays consistent and the next
     /// call goes on.
     bool update(Clock::time_point deadline, const Execution& execution = {});
+    /// Shows what threads of its own have done, and waits for nothing. True at rest.
+    bool publish(const Execution& execution = {}) { return update(Clock::now(), execution); }
     /// Until it is at rest.
     void finish(const Execution& execution = {});
 
@@ -102,7 +107,7 @@ class BrickScheduler {
     const ScheduleCounts& counts() const { return counts_; }
     /// The code path that samples, one of Resampler::targets().
     std::string_view resamplerTarget() const { return bound_->target(); }
-    const ResampleStatistics& statistics() const { return sampling_.statistics(); }
+    ResampleStatistics statistics() const { return sampling_.statistics(); }
     /// Drops all bricks that aren't shown.
     void forget();
 

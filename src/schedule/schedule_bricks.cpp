@@ -44,7 +44,7 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
         return refineAndResample(mesh, fields, resampler, options, execution);
     Timer timer;
     execution.report(Stage::planning, 0, 1);
-    ScheduleOptions schedule{options, options.transferFunction, 0};
+    ScheduleOptions schedule{options, options.transferFunction, 0, 0};
     int channels = 0;
     for (const int f : fields) channels += mesh.fields[std::size_t(f)].components;
     schedule.budgetBytes =

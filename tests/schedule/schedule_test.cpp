@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <random>
 #include <set>
+#include <thread>
 
 #include "brick_test_meshes.h"
 #include "refine/plan_frame.h"
@@ -161,6 +162,21 @@ TEST(Schedule, CoarseBricksComeFirstAndAtOnce) {
     const auto index = std::make_shared<const SharedElementIndex>(bench.mesh);
     EXPECT_EQ(sizes.front(), MeshBricks(index, bench.frame, 0, {}).roots().size());
     EXPECT_GT(sizes.size(), 10u);
+}
+
+TEST(Schedule, ThreadsOfItsOwnWorkBetweenCalls) {
+    ScheduleOptions options = optionsFor(Criterion::focus, 100'000);
+    options.threads = 2;
+    Bench bench(ballMesh(8, 1), options);
+    int calls = 0;
+    for (; !bench.scheduler->publish() && calls < 20'000; ++calls)
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
+    EXPECT_GT(calls, 0);
+    bench.expectWhole();
+    bench.expectPlan(bench.budget());
+    // It may end with work begun.
+    bench.scheduler->setFocus({pointFocus({-0.5, -0.4, 0.2}, 0.1)});
+    bench.scheduler->publish();
 }
 
 TEST(Schedule, JitterMovesNothing) {
@@ -338,6 +354,7 @@ void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
     ScheduleOptions options = optionsFor(criteria, 400 + std::int64_t(600 * share()));
     options.refine.resolution = seed % 2 == 0 ? 0 : 150;
     if (seed % 5 == 4) options.refine.boundsWorld = Box3d{Vec3d(-0.4, -0.7, 0), Vec3d(0.5, 0.8, 0.9)};
+    options.threads = seed % 4 == 2 ? 2 : 0;
     const ValueRange range{-1, 2};
     if (isSeen) options.transferFunction = showing(range, 0.3, 0.6);
     Bench bench(seed % 2 == 0 ? gradedMesh(6, 2) : ballMesh(6, 1), options);
