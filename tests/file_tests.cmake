@@ -9,6 +9,7 @@ if(TESSERA_BUILD_IO)
   tessera_test(vdb_metadata_test FOLDER vdb LINK vdb)
   tessera_test(library_test FOLDER library LINK library reference)
   tessera_test(job_test FOLDER job LINK job)
+  tessera_test(cache_test FOLDER cache LINK cache software)
   tessera_test(nvdb_test FOLDER vdb LINK vdb PRIVATE_LINK tessera_nanovdb)
   # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
   foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)

@@ -197,6 +197,12 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     command.add_option("--bounds", a.bounds, "sample only inside the box x0,y0,z0,x1,y1,z1 (world units)")
         ->group(group);
     command
+        .add_option(
+            "--resume", a.request.log,
+            "keep sampled bricks in this file, and take those that an earlier run left there: after a "
+            "run was killed the same command goes on")
+        ->group(group);
+    command
         .add_option("--like", a.request.like, "use the lattice (origin and finest spacing) of this .vdb file")
         ->group(group);
     command

@@ -227,6 +227,8 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
         require(r.refine.criterion.has(Criterion::error), "--error-field needs --refine error");
         for (const FieldChoice& choice : parseFields(a.errorFields)) r.errorFields.push_back(choice.source);
     }
+    require(r.log.empty() || !r.refine.criterion.has(Criterion::uniform),
+            "--resume goes with element-size, error and focus in --refine, not with uniform");
     r.format = &outputFormat(a);
     r.write.layout = chooseLayout(a, *r.format);
     r.write.background = float(a.background.value_or(0));

@@ -95,6 +95,9 @@ Json ResampleRun::run() {
     const std::vector<ResampleStep> steps = listSteps(request_);
     checkOutputs(steps, request_, job_);
     isSeries_ = steps.size() > 1 || !steps[0].source.collection.empty();
+    if (steps.size() > 1 && !request_.log.empty())
+        throw InputError("--resume keeps the bricks of one mesh, and this is a series of " +
+                         std::to_string(steps.size()) + " steps");
     if (!request_.like.empty()) takeLattice();
     declareStages();
     if (steps.size() > 1) surveySeries(steps);

@@ -27,6 +27,7 @@ struct ResampleRequest {
     std::optional<RepairOptions> repair;
     std::string algorithm = "software";    ///< or "auto"
     RefineOptions refine;                  ///< all but errorFields; maxMemoryBytes: of the whole run
+    std::string log;                       ///< keeps the bricks of a run that may be killed; empty: none
     std::string like;                      ///< a .vdb file whose lattice is taken; empty: none
     std::vector<FieldChoice> fields;       ///< empty: all
     std::vector<std::string> errorFields;  ///< that the error bound holds for; empty: all chosen point fields

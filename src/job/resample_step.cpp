@@ -6,12 +6,14 @@
 #include <utility>
 
 #include "base/timer.h"
+#include "cache/brick_log.h"
 #include "job/memory_plan.h"
 #include "job/program_presets.h"
 #include "job/report_text.h"
 #include "mesh_files/find_field.h"
 #include "refine/measure_error.h"
 #include "refine/plan.h"
+#include "refine/plan_frame.h"
 #include "refine/refine.h"
 #include "schedule/schedule_bricks.h"
 
@@ -47,10 +49,26 @@ void dryRun(const TetMesh& mesh, const StepPlan& plan, const Resampler& resample
                               resampler, plan.refine.bind, execution);
 }
 
-void sample(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler, StepResult& result,
-            StageTimes& times, const Execution& execution) {
+std::shared_ptr<BrickArchive> openLog(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler,
+                                      const std::string& path, const Execution& execution) {
+    if (path.empty()) return nullptr;
+    const Box3d box = meshBounds(mesh, execution);
+    checkOptions(mesh, box, plan.refine);
+    std::string algorithm = resampler.name();
+    if (!resampler.info().targetsAgree)
+        algorithm +=
+            " " + (plan.refine.bind.target.empty() ? resampler.targets().front() : plan.refine.bind.target);
+    if (plan.refine.bind.format != SampleFormat::r32f)
+        algorithm += " " + std::string(nameOf(plan.refine.bind.format));
+    return std::make_shared<BrickLog>(
+        path, BrickLog::describe(mesh, plan.selection.fields, algorithm, chooseFrame(box, plan.refine)));
+}
+
+void sample(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler, const std::string& log,
+            StepResult& result, StageTimes& times, const Execution& execution) {
     BrickResult& bricks = result.bricks;
-    bricks = makeBricks(mesh, plan.selection.fields, resampler, plan.refine, execution);
+    bricks = makeBricks(mesh, plan.selection.fields, resampler, plan.refine, execution,
+                        openLog(mesh, plan, resampler, log, execution));
     times.planMs = bricks.times.planMs;
     times.resampleMs = bricks.times.resampleMs;
     times.verifyMs = bricks.times.verifyMs;
@@ -122,7 +140,7 @@ StepResult resampleStep(const ResampleStep& step, const TetMesh& mesh, const Ste
         dryRun(mesh, plan, resampler, result, times, execution);
         return result;
     }
-    sample(mesh, plan, resampler, result, times, execution);
+    sample(mesh, plan, resampler, request.log, result, times, execution);
     write(step, mesh, plan, request, resampler, result, times, execution);
     judgeFile(mesh, plan, result.bricks);
     return result;

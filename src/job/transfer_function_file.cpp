@@ -62,7 +62,8 @@ class StopsReader {
         return json[key].get<double>();
     }
 
-    void checkKeys(const StopsJson& json, const std::string& place, const std::set<std::string>& known) const {
+    void checkKeys(const StopsJson& json, const std::string& place,
+                   const std::set<std::string>& known) const {
         if (!json.is_object()) throw InputError(fmt::format("{}: {}: expected an object", path_, place));
         for (const auto& [key, value] : json.items())
             if (!known.contains(key))

@@ -10,10 +10,10 @@
 
 namespace tessera {
 
-/// Bricks of one depth that are sampled as one box.
+/// Bricks of one depth that are sampled as one box, or one that is read.
 struct BrickSampling::Task {
-    std::vector<DepthKey> bricks;
     std::unique_ptr<StoppableSampling> sampling;
+    std::function<void()> read;
     bool isRunning = false, hasBegun = false, isDone = false;
 };
 
@@ -63,8 +63,12 @@ std::shared_ptr<const Block> cut(const Block& from, const IndexBox& box) {
 
 BrickSampling::BrickSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
                              const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector,
-                             int threads)
-    : bound_(bound), index_(std::move(index)), frame_(frame), inspector_(std::move(inspector)) {
+                             std::shared_ptr<BrickArchive> archive, int threads)
+    : bound_(bound),
+      index_(std::move(index)),
+      frame_(frame),
+      inspector_(std::move(inspector)),
+      archive_(std::move(archive)) {
     for (int t = 0; t < threads; ++t)
         threads_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
 }
@@ -74,32 +78,52 @@ BrickSampling::~BrickSampling() {
     threads_.clear();
 }
 
+void BrickSampling::add(Order& order, const DepthKey& key, std::shared_ptr<const Block> samples,
+                        bool wasRead) {
+    if (archive_ && !wasRead) archive_->append(key, *samples);
+    SampledBrick brick{key, std::move(samples), {}, wasRead};
+    if (inspector_) brick.findings = inspector_->inspect(key, *brick.samples, frame_);
+    const std::lock_guard lock(mutex_);
+    order.sampled.push_back(std::move(brick));
+}
+
+void BrickSampling::addReading(Order& order, const DepthKey& key) {
+    auto task = std::make_shared<Task>();
+    task->read = [this, key, to = &order] {
+        const Lattice lattice = Lattice::axisParallel(frame_.originWorld, frame_.spacingWorld(key.depth));
+        add(*to, key, archive_->read(key, lattice, closedBox(key, frame_.brickCells)), true);
+    };
+    order.tasks.push_back(std::move(task));
+}
+
+void BrickSampling::addSampling(Order& order, const std::vector<DepthKey>& bricks) {
+    if (bricks.empty()) return;
+    const int cells = frame_.brickCells;
+    IndexBox box = closedBox(bricks.front(), cells);
+    for (const DepthKey& key : bricks) {
+        const IndexBox own = closedBox(key, cells);
+        box = {glm::min(box.min, own.min), glm::max(box.max, own.max)};
+    }
+    const double spacing = frame_.spacingWorld(bricks.front().depth);
+    auto task = std::make_shared<Task>();
+    task->sampling = std::make_unique<StoppableSampling>(
+        bound_, index_, Lattice::axisParallel(frame_.originWorld, spacing), std::span(&box, 1),
+        [this, cells, bricks, to = &order](std::size_t, const Block& block) {
+            for (const DepthKey& key : bricks) add(*to, key, cut(block, closedBox(key, cells)), false);
+        });
+    order.tasks.push_back(std::move(task));
+}
+
 std::shared_ptr<BrickSampling::Order> BrickSampling::order(std::span<const std::vector<DepthKey>> together) {
     auto order = std::make_shared<Order>();
-    const int cells = frame_.brickCells;
     for (const std::vector<DepthKey>& bricks : together) {
-        if (bricks.empty()) continue;
-        IndexBox box = closedBox(bricks.front(), cells);
-        for (const DepthKey& key : bricks) {
-            const IndexBox own = closedBox(key, cells);
-            box = {glm::min(box.min, own.min), glm::max(box.max, own.max)};
-        }
-        const double spacing = frame_.spacingWorld(bricks.front().depth);
-        auto task = std::make_shared<Task>();
-        task->bricks = bricks;
-        task->sampling = std::make_unique<StoppableSampling>(
-            bound_, index_, Lattice::axisParallel(frame_.originWorld, spacing), std::span(&box, 1),
-            [this, cells, keys = bricks, to = order.get()](std::size_t, const Block& block) {
-                std::vector<SampledBrick> parts;
-                for (const DepthKey& key : keys) {
-                    parts.push_back({key, cut(block, closedBox(key, cells)), {}});
-                    if (inspector_)
-                        parts.back().findings = inspector_->inspect(key, *parts.back().samples, frame_);
-                }
-                const std::lock_guard lock(mutex_);
-                to->sampled.insert(to->sampled.end(), parts.begin(), parts.end());
-            });
-        order->tasks.push_back(std::move(task));
+        std::vector<DepthKey> sampled;
+        for (const DepthKey& key : bricks)
+            if (archive_ && archive_->contains(key))
+                addReading(*order, key);
+            else
+                sampled.push_back(key);
+        addSampling(*order, sampled);
     }
     order->left = order->tasks.size();
     const std::lock_guard lock(mutex_);
@@ -158,7 +182,7 @@ void BrickSampling::endPiece(const Taken& taken, bool isDone) {
     task.isDone = isDone;
     changed_.notify_all();
     if (!isDone) return;
-    statistics_ += task.sampling->statistics();
+    if (task.sampling) statistics_ += task.sampling->statistics();
     task.sampling.reset();
     if (--taken.order->left > 0) return;
     std::erase(queue_, taken.order);
@@ -168,7 +192,9 @@ void BrickSampling::endPiece(const Taken& taken, bool isDone) {
 // Without the lock; true when the task is done.
 bool BrickSampling::step(const Taken& taken, std::int64_t elements, const Execution& execution) {
     execution.throwIfCancelled();
-    return taken.task->sampling->step(elements, execution);
+    if (taken.task->sampling) return taken.task->sampling->step(elements, execution);
+    taken.task->read();
+    return true;
 }
 
 /// The threads of one call of work().

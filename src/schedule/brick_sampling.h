@@ -18,6 +18,7 @@
 #include "refine/brick_findings.h"
 #include "refine/brick_plan.h"
 #include "resample/stoppable_sampling.h"
+#include "schedule/brick_archive.h"
 #include "tessera/execution.h"
 #include "tessera/resampler.h"
 
@@ -28,6 +29,7 @@ struct SampledBrick {
     DepthKey key;
     std::shared_ptr<const Block> samples;
     std::optional<BrickFindings> findings;
+    bool wasRead = false;  ///< from the archive
 };
 
 /// Samples bricks in the order in which they were asked for, on several threads, stopping and going on within
@@ -40,10 +42,12 @@ class BrickSampling {
     class Order;
 
     /// All must outlive it; the resampler is best bound with the same index. @param inspector looks at each
-    /// brick that is sampled; may be null. @param threads of its own, which sample whenever there is an
+    /// brick; may be null. @param archive where bricks are looked for first and kept; may be null. @param
+    /// threads of its own, which sample whenever there is an
     /// order; 0: sampling is done by work() alone.
     BrickSampling(BoundResampler& bound, std::shared_ptr<const SharedElementIndex> index,
-                  const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector, int threads);
+                  const PlanFrame& frame, std::shared_ptr<const BrickInspector> inspector,
+                  std::shared_ptr<BrickArchive> archive, int threads);
     ~BrickSampling();
 
     /// Puts bricks of one depth at the end of the queue.
@@ -74,6 +78,9 @@ class BrickSampling {
         std::shared_ptr<Task> task;
         explicit operator bool() const { return task != nullptr; }
     };
+    void addSampling(Order& order, const std::vector<DepthKey>& bricks);
+    void addReading(Order& order, const DepthKey& key);
+    void add(Order& order, const DepthKey& key, std::shared_ptr<const Block> samples, bool wasRead);
     Taken nextTask();
     bool hasTask() const;
     bool step(const Taken& taken, std::int64_t elements, const Execution& execution);
@@ -86,6 +93,7 @@ class BrickSampling {
     std::shared_ptr<const SharedElementIndex> index_;
     const PlanFrame& frame_;
     std::shared_ptr<const BrickInspector> inspector_;
+    std::shared_ptr<BrickArchive> archive_;
     mutable std::mutex mutex_;  ///< of all below
     std::condition_variable_any changed_;
     std::deque<std::shared_ptr<Order>> queue_;  ///< that aren't done

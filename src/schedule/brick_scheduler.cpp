@@ -104,7 +104,7 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       watchedField_(options.transferFunction ? options.transferFunction->field : ""),
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
-                options.threads) {
+                options.archive, options.threads) {
     constexpr std::size_t kMostReserved = 1 << 20;
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
     splits_.reserve(std::min(budgetBricks(), kMostReserved) / 8);
@@ -256,7 +256,7 @@ bool BrickScheduler::publishFinished() {
         for (SampledBrick& brick : sampling_.take(*change.order)) {
             memory_.add(brick.key, std::move(brick.samples));
             if (brick.findings) bricks_.setFindings(*bricks_.find(brick.key), std::move(*brick.findings));
-            ++counts_.sampled;
+            ++(brick.wasRead ? counts_.read : counts_.sampled);
         }
         reserved_ -= change.missing;
         show(change);

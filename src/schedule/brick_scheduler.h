@@ -37,6 +37,8 @@ struct ScheduleOptions {
     std::int64_t budgetBytes = std::int64_t(1) << 30;
     /// Threads of its own, which sample between calls too; 0: all work is done in update().
     int threads = 0;
+    /// Bricks are read there if they are there, and kept there when they were sampled; may be null.
+    std::shared_ptr<BrickArchive> archive = nullptr;
 };
 
 /// Of the samples of a brick's closed box.
@@ -45,6 +47,7 @@ std::int64_t bytesOfBrick(int channels, int brickCells);
 /// What a scheduler has done so far.
 struct ScheduleCounts {
     std::int64_t sampled = 0;    ///< bricks
+    std::int64_t read = 0;       ///< bricks read from the archive
     std::int64_t reused = 0;     ///< bricks shown again from memory
     std::int64_t dropped = 0;    ///< bricks dropped from memory
     std::int64_t published = 0;  ///< changes shown

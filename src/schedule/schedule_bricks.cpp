@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.h"
@@ -39,12 +40,14 @@ BricksShown bricksOf(const BrickScheduler& scheduler, Depth finest) {
 }
 
 BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
-                       const RefineOptions& options, const Execution& execution) {
-    if (!options.criterion.has(Criterion::visibility))
+                       const RefineOptions& options, const Execution& execution,
+                       std::shared_ptr<BrickArchive> archive) {
+    if (!options.criterion.has(Criterion::visibility) && !archive)
         return refineAndResample(mesh, fields, resampler, options, execution);
     Timer timer;
     execution.report(Stage::planning, 0, 1);
-    ScheduleOptions schedule{options, options.transferFunction, 0, 0};
+    ScheduleOptions schedule{
+        .refine = options, .transferFunction = options.transferFunction, .archive = std::move(archive)};
     int channels = 0;
     for (const int f : fields) channels += mesh.fields[std::size_t(f)].components;
     schedule.budgetBytes =
@@ -76,6 +79,13 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
     result.report = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);
     result.times.verifyMs = timer.elapsedMs();
     result.bounded = true;
+    if (!isBoundedEverywhere(options)) return result;
+    const std::string exceeded = exceededBound(mesh, fields, options, result.report);
+    result.bounded = exceeded.empty();
+    if (!result.bounded)
+        result.stoppedBecause =
+            (scheduler.isCutShort() ? "the bound on voxels" : "the finest spacing allowed") +
+            (" ended the refinement at " + exceeded);
     return result;
 }
 

@@ -21,10 +21,11 @@ struct BricksShown {
 /// @param finest depth that becomes level 0; not above the deepest leaf.
 BricksShown bricksOf(const BrickScheduler& scheduler, Depth finest);
 
-/// From a mesh to bricks by any criterion: refineAndResample(), or with Criterion::visibility a scheduler
-/// that comes to rest.
+/// From a mesh to bricks by any criterion: refineAndResample(), or with Criterion::visibility or an archive a
+/// scheduler that comes to rest.
 /// @param fields indices into mesh.fields: the channels, in this order.
 BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
-                       const RefineOptions& options, const Execution& execution);
+                       const RefineOptions& options, const Execution& execution,
+                       std::shared_ptr<BrickArchive> archive = nullptr);
 
 }  // namespace tessera

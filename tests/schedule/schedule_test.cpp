@@ -19,10 +19,23 @@ namespace {
 
 using Clock = BrickScheduler::Clock;
 
+/// Under a sanitizer all is many times slower.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kIsWatched = true;
+#else
+constexpr bool kIsWatched = false;
+#endif
+
 TetMesh meshWithField(TetMesh mesh) {
     addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(5 * p.x) + p.y * p.z; });
     return mesh;
 }
+
+#ifdef __SANITIZE_THREAD__
+#define TESSERA_ON_ONE_THREAD GTEST_SKIP() << "runs on one thread: nothing for this sanitizer to find"
+#else
+#define TESSERA_ON_ONE_THREAD static_cast<void>(0)
+#endif
 
 struct Bench {
     explicit Bench(TetMesh made, ScheduleOptions with) : mesh(meshWithField(std::move(made))), options(with) {
@@ -154,6 +167,7 @@ TEST(Schedule, AtRestShowsThePlan) {
 }
 
 TEST(Schedule, CoarseBricksComeFirstAndAtOnce) {
+    TESSERA_ON_ONE_THREAD;
     Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 100'000));
     std::vector<std::size_t> sizes;
     bench.target->afterEach = [&] { sizes.push_back(bench.target->leaves.size()); };
@@ -180,6 +194,7 @@ TEST(Schedule, ThreadsOfItsOwnWorkBetweenCalls) {
 }
 
 TEST(Schedule, JitterMovesNothing) {
+    TESSERA_ON_ONE_THREAD;
     Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 2'000));
     bench.scheduler->finish();
     const ScheduleCounts before = bench.scheduler->counts();
@@ -197,6 +212,7 @@ TEST(Schedule, JitterMovesNothing) {
 }
 
 TEST(Schedule, ComingBackSamplesNothing) {
+    TESSERA_ON_ONE_THREAD;
     Bench bench(ballMesh(8, 1), optionsFor(Criterion::focus, 100'000));
     bench.scheduler->finish();
     bench.scheduler->setFocus({pointFocus({-0.5, -0.4, 0.2}, 0.1)});
@@ -238,6 +254,7 @@ TEST(Schedule, ByErrorEndsWithinTheBound) {
 }
 
 TEST(Schedule, RefinesOnlyWhatIsSeen) {
+    TESSERA_ON_ONE_THREAD;
     ScheduleOptions options = optionsFor(Criterion::error, 100'000);
     options.refine.maxError = 0.01;
     Bench everything(ballMesh(8, 1), options);
@@ -273,6 +290,7 @@ TEST(Schedule, RefinesOnlyWhatIsSeen) {
 }
 
 TEST(Schedule, RefusesWhatItCannotKeep) {
+    TESSERA_ON_ONE_THREAD;
     EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::focus, 4)), InputError);
     EXPECT_THROW(Bench(ballMesh(4, 1), optionsFor(Criterion::uniform, 1000)), InputError);
     Bench bench(ballMesh(4, 1), optionsFor(Criterion::focus, 1000));
@@ -290,6 +308,7 @@ int asked(const char* name, int otherwise) {
 // Reads a linear field on both sides of faces between leaves, in a state of work half done.
 // TESSERA_SCHEDULE_FACES asks for more places.
 TEST(Schedule, LinearFieldsHaveNoStepBetweenLeaves) {
+    TESSERA_ON_ONE_THREAD;
     TetMesh mesh = ballMesh(6, 1);
     const Vec3d slope(0.7, -1.3, 0.4);
     addPointField(mesh, "linear", [&](const Vec3d& p) { return glm::dot(slope, p) + 2; });
@@ -301,7 +320,7 @@ TEST(Schedule, LinearFieldsHaveNoStepBetweenLeaves) {
     BrickScheduler scheduler(mesh, fields, resampler, options, target);
     std::mt19937 random(5);
     const auto share = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
-    const int states = 10, places = asked("TESSERA_SCHEDULE_FACES", 20'000) / states;
+    const int states = 10, places = asked("TESSERA_SCHEDULE_FACES", kIsWatched ? 2000 : 20'000) / states;
     const NearestOnDemand nearest(mesh, 1);
     int compared = 0, acrossLevels = 0;
     for (int state = 0; state < states; ++state) {
@@ -419,7 +438,8 @@ void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
 
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
 TEST(Schedule, EveryPublishedStateIsWhole) {
-    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", 3), steps = asked("TESSERA_SCHEDULE_STEPS", 300);
+    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", kIsWatched ? 2 : 3),
+              steps = asked("TESSERA_SCHEDULE_STEPS", kIsWatched ? 60 : 300);
     int cutShort = 0;
     ScheduleCounts sum;
     for (int seed = 0; seed < seeds && !HasFailure(); ++seed)

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <span>
+#include <string>
+#include <unordered_map>
+
+#include "refine/brick_plan.h"
+#include "schedule/brick_archive.h"
+#include "schedule/brick_memory.h"
+#include "tessera/mesh.h"
+
+namespace tessera {
+
+/// A file to which bricks are appended as they are sampled. What a killed program had appended is there when
+/// the file is opened again; a brick that was cut off at the end is dropped.
+///
+/// The file begins with the line "tessera brick log 1" and a line of JSON that says what its bricks were made
+/// of. Then come records: seven 32-bit words (a mark, depth, x, y, z, bytes unpacked, bytes packed; little
+/// endian), the samples packed by Blosc (values channel by channel, then one byte of coverage a point), and
+/// 36 characters of a digest of all that.
+class BrickLog : public BrickArchive {
+  public:
+    /// What the bricks of a log are made of, as its line of JSON. Reads the whole mesh.
+    /// @param fields indices into mesh.fields: the channels. @param algorithm and the code path where paths
+    /// differ in bits.
+    static std::string describe(const TetMesh& mesh, std::span<const int> fields,
+                                const std::string& algorithm, const PlanFrame& frame);
+
+    /// Opens a log, or makes one. Throws InputError when the file isn't a log or was made of something else,
+    /// IoError when it can't be used.
+    BrickLog(const std::string& path, const std::string& description);
+    ~BrickLog() override;
+    BrickLog(const BrickLog&) = delete;
+    BrickLog& operator=(const BrickLog&) = delete;
+
+    std::size_t brickCount() const;
+    /// Bytes at the end that were dropped when it was opened: no whole brick.
+    std::int64_t droppedBytes() const { return droppedBytes_; }
+
+    bool contains(const DepthKey& key) const override;
+    std::shared_ptr<const Block> read(const DepthKey& key, const Lattice& lattice,
+                                      const IndexBox& box) const override;
+    void append(const DepthKey& key, const Block& samples) override;
+
+  private:
+    struct Place {
+        std::int64_t offset = 0;
+        std::int64_t bytes = 0;  ///< of the whole record
+    };
+    void scan(std::int64_t from);
+
+    std::string path_;
+    int descriptor_ = -1;
+    std::int64_t droppedBytes_ = 0;
+    mutable std::mutex mutex_;  ///< of all below
+    std::int64_t end_ = 0;
+    std::unordered_map<DepthKey, Place, DepthKeyHash> places_;
+};
+
+}  // namespace tessera
