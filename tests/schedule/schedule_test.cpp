@@ -240,10 +240,11 @@ TransferFunction showing(const ValueRange& range, double a, double b) {
 
 // Measured without the scheduler: no leaf has an error beyond the bound, but at the finest spacing.
 TEST(Schedule, ByErrorEndsWithinTheBound) {
+    TESSERA_ON_ONE_THREAD;
     ScheduleOptions options = optionsFor(Criterion::error, 100'000);
     options.refine.maxError = 0.006;
     Bench bench(ballMesh(8, 1), options);
-    bench.scheduler->finish({.threads = 2});
+    bench.scheduler->finish();
     std::size_t fine = 0;
     for (const GrowingLeaf& leaf : bench.scheduler->tree().leaves()) {
         const float worst = bench.findingsAlone(leaf.key).worst;
@@ -438,8 +439,8 @@ void runAtRandom(unsigned seed, int steps, int& cutShort, ScheduleCounts& sum) {
 
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
 TEST(Schedule, EveryPublishedStateIsWhole) {
-    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", kIsWatched ? 2 : 3),
-              steps = asked("TESSERA_SCHEDULE_STEPS", kIsWatched ? 60 : 300);
+    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", 3),
+              steps = asked("TESSERA_SCHEDULE_STEPS", kIsWatched ? 100 : 300);
     int cutShort = 0;
     ScheduleCounts sum;
     for (int seed = 0; seed < seeds && !HasFailure(); ++seed)
