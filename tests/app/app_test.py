@@ -900,6 +900,94 @@ class Programs(AppTest):
             self.assertAlmostEqual((a - b) / 0.07, round((a - b) / 0.07), places=9)
 
 
+class Refinement(AppTest):
+    """--refine around a focus, by several criteria, by what is seen, and runs that go on."""
+
+    def bricks(self, *options):
+        # Where the finest spacing ends a refinement by error there is a warning.
+        result = self.run_tessera("resample", self.stokes, "-o", "out.vdb", "--field", "pressure", "--brick-size", "8",
+                                  "--json", "-", *options)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.succeed("verify", self.stokes, "out.vdb", "--quiet")
+        return json.loads(result.stdout)
+
+    def voxels(self, *options):
+        return 512 * self.bricks(*options)["bricks"]["total"]
+
+    def test_criteria_combine(self):
+        focus = ("--focus", "0,0.3,0", "--radius", "0.5", "--resolution", "300")
+        by_focus = self.voxels("--refine", "focus", *focus)
+        by_error = self.voxels("--refine", "error", "--max-error", "5%", "--resolution", "300")
+        report = self.bricks("--refine", "error,focus", "--max-error", "5%", *focus)
+        both = 512 * report["bricks"]["total"]
+        self.assertEqual(report["criterion"], "error,focus")
+        self.assertLessEqual(both, by_focus + by_error)
+        self.assertGreaterEqual(both, max(by_focus, by_error))
+
+    def test_words_that_do_not_fit_are_refused(self):
+        for words, options in (
+                ("--focus x,y,z", ["--refine", "focus"]),
+                ("--radius", ["--refine", "focus", "--focus", "1,2,3"]),
+                ("--radius above 0", ["--refine", "focus", "--focus", "1,2,3", "--radius", "0"]),
+                ("--focus 1,2", ["--refine", "focus", "--focus", "1,2", "--radius", "1"]),
+                ("focus,sharp", ["--refine", "focus,sharp"]),
+                ("uniform no other", ["--refine", "uniform,focus", "--resolution", "30"]),
+                ("--refine focus", ["--focus", "1,2,3", "--radius", "1"]),
+                ("--transfer-function", ["--refine", "error,visibility", "--max-error", "1%"]),
+                ("visibility", ["--refine", "error", "--max-error", "1%", "--transfer-function", "tf.json"]),
+                ("--resume uniform", ["--refine", "uniform", "--resolution", "30", "--resume", "log"])):
+            self.reject(2, words, "resample", self.stokes, "-o", "out.vdb", *options)
+
+    def test_a_transfer_function_is_read_strictly(self):
+        seen = ("--refine", "element-size,visibility", "--transfer-function")
+        for words, text in (
+                ("tf.json JSON", "{"),
+                ("tf.json stops[0] unknown opacty", '{"stops": [{"value": 1, "opacty": 1}]}'),
+                ("tf.json stops", '{"field": "pressure"}'),
+                ("tf.json stops[1].opacity", '{"stops": [{"value": 1, "opacity": 1}, {"value": 2}]}'),
+                ("tf.json ascend", '{"stops": [{"value": 1, "opacity": 1}, {"value": 0, "opacity": 1}]}'),
+                ("tf.json between 0 and 1", '{"stops": [{"value": 1, "opacity": 1.5}]}')):
+            self.write("tf.json", text)
+            self.reject(2, words, "resample", self.stokes, "-o", "out.vdb", *seen, "tf.json")
+        self.write("tf.json", '{"field": "none", "stops": [{"value": 1, "opacity": 1}]}')
+        self.reject(2, "none", "resample", self.stokes, "-o", "out.vdb", *seen, "tf.json")
+
+    def test_only_what_is_seen_is_refined(self):
+        def refined(*shown):
+            options = ["--refine", "error", "--max-error", "2%", "--max-levels", "6"]
+            if shown:
+                stops = [{"value": v, "opacity": o} for v, o in zip((shown[0], *shown, shown[1]), (0, 0.5, 0.5, 0))]
+                self.write("tf.json", json.dumps({"field": "pressure", "stops": stops}))
+                options[1] += ",visibility"
+                options += ["--transfer-function", "tf.json"]
+            return self.bricks(*options)["bricks"]
+        everything, some, nothing = refined(), refined(5, 10), refined(100, 200)
+        self.assertLess(some["total"], everything["total"])
+        self.assertEqual(len(nothing["per_level"]), 1)
+        self.assertGreater(len(some["per_level"]), 3)
+
+    def test_a_killed_run_goes_on(self):
+        def command(out, log):
+            return ["resample", self.stokes, "-o", out, "--quiet", "--refine", "focus", "--focus", "0,0.3,0", "--radius", "1",
+                    "--resolution", "300", "--resume", log]
+        start = time.monotonic()
+        self.succeed(*command("whole.vdb", "whole.log"))
+        whole = time.monotonic() - start
+        expected = (self.folder / "whole.vdb").read_bytes()
+        for share in (0.3, 0.5, 0.7, 0.9):
+            (self.folder / "run.log").unlink(missing_ok=True)
+            process = subprocess.Popen([TESSERA, *map(str, command("run.vdb", "run.log"))], cwd=self.folder)
+            time.sleep(share * whole)
+            process.kill()
+            process.wait()
+            self.succeed(*command("run.vdb", "run.log"))
+            self.assertEqual((self.folder / "run.vdb").read_bytes(), expected)
+        self.reject(2, "whole.log log", *command("other.vdb", "whole.log"), "--brick-size", "8")
+        self.write("no.log", "text of somebody's")
+        self.reject(2, "no.log log", *command("other.vdb", "no.log"))
+        self.assertEqual((self.folder / "no.log").read_text(), "text of somebody's")
+
+
 class Slices(AppTest):
     """tessera slice."""
 
