@@ -192,6 +192,13 @@ bool BrickPool::isHeld() const {
     });
 }
 
+std::size_t BrickPool::freeSlots() {
+    return thread().run([&](GlContext&) {
+        device_->freeRetired();
+        return device_->freeSlots.size();
+    });
+}
+
 std::optional<std::vector<std::uint32_t>> BrickPool::takeSlots(std::size_t count) {
     return thread().run([&](GlContext&) -> std::optional<std::vector<std::uint32_t>> {
         std::vector<std::uint32_t>& free = device_->freeSlots;

@@ -67,6 +67,8 @@ class BrickPool {
     std::shared_ptr<const PoolState> state() const;
     /// Whether a state is held.
     bool isHeld() const;
+    /// Slots that nothing refers to by now.
+    std::size_t freeSlots();
 
     /// Takes so many slots, or none when there aren't as many that no state holds; waits for the device
     /// rather than give none.

@@ -106,6 +106,7 @@ bool PoolTarget::catchUp() {
     if (bricks_.leafCount() > pool_.capacity())
         throw InputError(std::to_string(bricks_.leafCount()) + " bricks are shown, and the pool holds " +
                          std::to_string(pool_.capacity()));
+    if (pool_.isHeld() && pool_.freeSlots() < stale_.size()) return false;
     std::vector<Work> work = codeStale();
     // One task, so that no frame comes between.
     return pool_.thread().run([&](GlContext&) { return show(work); });

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -98,18 +99,24 @@ class PoolOnDevice {
         return 0;
     }
 
-    /// All bytes of a slot: to see whether they stay.
-    std::vector<std::uint8_t> slotBytes(std::uint32_t slot) const {
-        std::vector<std::uint8_t> bytes;
+    /// Whether both hold the same bytes in a slot.
+    bool agreesIn(std::uint32_t slot, const PoolOnDevice& other) const {
         const int edge = pool_.layout().edge;
-        for (int n = 0; n < edge * edge * edge; ++n) {
-            const Vec3i local(n % edge, n / edge % edge, n / (edge * edge));
-            for (int channel = 0; channel < pool_.coding().channels(); ++channel)
-                for (int i = 0; i < 4; ++i)
-                    bytes.push_back(std::uint8_t(bits(slot, channel, local) >> (8 * i)));
-            bytes.push_back(coverage(slot, 0, local));
+        for (std::size_t group = 0; group < pool_.coding().groupCount(); ++group) {
+            const std::size_t at = plane(slot, group);
+            const auto bytes = std::size_t(pool_.coding().texelBytes(group));
+            const auto isSame = [&](const auto& planes, const auto& others, std::size_t first,
+                                    std::size_t size) {
+                return std::memcmp(&planes[at][first * size], &others[at][first * size],
+                                   std::size_t(edge) * size) == 0;
+            };
+            for (int row = 0; row < edge * edge; ++row) {
+                const std::size_t first = texel(slot, Vec3i(0, row % edge, row / edge));
+                if (!isSame(codes_, other.codes_, first, bytes)) return false;
+                if (!isSame(coverage_, other.coverage_, first, 1)) return false;
+            }
         }
-        return bytes;
+        return true;
     }
     const std::vector<std::uint32_t>& words() const { return words_; }
 

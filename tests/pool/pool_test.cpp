@@ -44,10 +44,10 @@ enum class Algorithm { software, slicing };
 struct Setting {
     SampleFormat format = SampleFormat::r32f;
     Algorithm algorithm = Algorithm::software;
-    int budgetBricks = 400;
-    int poolBricks = 700;
+    int budgetBricks = 250;
+    int poolBricks = 400;
     int atlasTexels = 1024;
-    int resolution = 120;
+    int resolution = 249;
 };
 
 /// A scheduler that fills a pool, on an OpenGL thread of its own.
@@ -299,7 +299,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     Setting setting;
     std::tie(setting.format, setting.algorithm) = GetParam();
     const bool isSlow = setting.algorithm == Algorithm::slicing;
-    if (isSlow) setting.resolution = 60, setting.budgetBricks = 150;
+    if (isSlow) setting.resolution = 125, setting.budgetBricks = 150;
     setting.atlasTexels = setting.format == SampleFormat::r8 ? 50 : 1024;
     Bench bench(setting);
     if (setting.format == SampleFormat::r8) {
@@ -307,7 +307,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     }
     std::mt19937 random(unsigned(setting.format) + 7);
     const int updates = updatesAsked(isSlow ? 8 : 60);
-    const int every = std::max(updates / (isSlow ? 1 : 3), 1);
+    const int every = std::max(updates / (isSlow ? 1 : 2), 1);
     Seen seen;
     int acrossDepths = 0;
     for (int step = 1; step <= updates && !HasFailure(); ++step) {
@@ -345,7 +345,7 @@ INSTANTIATE_TEST_SUITE_P(All, PoolOfFormat,
 
 TEST(Pool, StatesThatAreHeldStay) {
     TESSERA_NEEDS_GL(kPlatform);
-    Bench bench({.format = SampleFormat::r16, .budgetBricks = 250, .poolBricks = 330});
+    Bench bench({.format = SampleFormat::r16, .budgetBricks = 200, .poolBricks = 250});
     bench.scheduler->finish({.threads = 1});
     std::mt19937 random(5);
     Seen seen;
@@ -360,15 +360,15 @@ TEST(Pool, StatesThatAreHeldStay) {
         const PoolOnDevice after(*bench.pool, *held);
         EXPECT_EQ(before.words(), after.words());
         std::int64_t changed = 0;
-        for (const std::uint32_t slot : slots) changed += before.slotBytes(slot) != after.slotBytes(slot);
+        for (const std::uint32_t slot : slots) changed += !before.agreesIn(slot, after);
         EXPECT_EQ(changed, 0);
         if (round % 2 == 0)
             held.reset();
         else
             bench.thread.run([&](GlContext&) { held.reset(); });
         EXPECT_TRUE(bench.target->catchUp());
-        expectPool(bench, seen);
     }
+    expectPool(bench, seen);
     EXPECT_GT(bench.target->counts().postponed, 0);
 }
 
@@ -382,7 +382,7 @@ TEST(Pool, ThatIsJustLargeEnoughIsNeverBehind) {
     for (int round = 0; round < 6; ++round) {
         bench.jump(random);
         bench.scheduler->finish({.threads = 1});
-        expectPool(bench, seen);
+        if (round % 3 == 2) expectPool(bench, seen);
     }
     EXPECT_EQ(bench.target->counts().postponed, 0);
 }
