@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "base/check.h"
+#include "pool/shaders.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -190,6 +190,10 @@ bool BrickPool::isHeld() const {
         return std::any_of(device_->copies.begin(), device_->copies.end(),
                            [](const auto& copy) { return copy->holders > 0; });
     });
+}
+
+ShaderText brickIndexShader() {
+    return shaders::pool::kBrickIndex;
 }
 
 std::size_t BrickPool::freeSlots() {

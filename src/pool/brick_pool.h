@@ -9,6 +9,7 @@
 
 #include "gl/gl_handles.h"
 #include "gl/gl_thread.h"
+#include "gl/shader_text.h"
 #include "pool/brick_index.h"
 #include "pool/slot_layout.h"
 #include "pool/texel_coding.h"
@@ -30,6 +31,10 @@ struct PoolState {
     const GlBuffer* index = nullptr;
     std::int64_t number = 0;  ///< counts the states shown, from 1 on
 };
+
+/// GLSL that finds the brick at a place by PoolState::index: findBrick(). Needs BRICK_INDEX_BINDING, the
+/// binding of that buffer.
+ShaderText brickIndexShader();
 
 /// What goes into a slot.
 struct SlotUpload {

@@ -9,6 +9,7 @@
 #include <tuple>
 
 #include "brick_test_meshes.h"
+#include "gl/gl_program.h"
 #include "gl_test_tools.h"
 #include "pool/pool_on_device.h"
 #include "refine/plan_frame.h"
@@ -307,7 +308,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     }
     std::mt19937 random(unsigned(setting.format) + 7);
     const int updates = updatesAsked(isSlow ? 8 : 60);
-    const int every = std::max(updates / (isSlow ? 1 : 2), 1);
+    const int every = isSlow ? updates : 30;
     Seen seen;
     int acrossDepths = 0;
     for (int step = 1; step <= updates && !HasFailure(); ++step) {
@@ -420,6 +421,102 @@ TEST(Pool, TellsItsBytes) {
     bench.scheduler->finish({.threads = 1});
     EXPECT_GT(bench.pool->deviceBytes(), textures);
     EXPECT_LT(bench.pool->deviceBytes(), textures + 100000);
+}
+
+// What a shader finds at each of some places.
+struct FoundByShader {
+    std::int32_t isThere;
+    std::uint32_t slot;
+    std::int32_t depth;
+    float inBrick;  // along x
+};
+std::vector<FoundByShader> findByShader(GlThread& thread, const GlBuffer& index,
+                                        std::span<const Vec3d> places) {
+    constexpr ShaderText kMain{"find_bricks", R"(
+        layout(local_size_x = 64) in;
+        layout(std430, binding = 1) readonly buffer Places { ivec4 roots_rests[]; };
+        layout(std430, binding = 2) writeonly buffer Found { ivec4 found[]; };
+        void main() {
+            uint i = gl_GlobalInvocationID.x;
+            if (2 * i >= roots_rests.length()) return;
+            FoundBrick brick = findBrick(roots_rests[2 * i].xyz, intBitsToFloat(roots_rests[2 * i + 1].xyz));
+            found[i] = ivec4(brick.isThere, brick.slot, brick.depth, floatBitsToInt(brick.inBrick.x));
+        })"};
+    std::vector<std::array<std::int32_t, 8>> asked;
+    for (const Vec3d& place : places) {
+        const Vec3d root = glm::floor(place);
+        const auto rest = [&](int a) { return std::bit_cast<std::int32_t>(float(place[a] - root[a])); };
+        asked.push_back({int(root.x), int(root.y), int(root.z), 0, rest(0), rest(1), rest(2), 0});
+    }
+    std::vector<FoundByShader> found(places.size());
+    thread.run([&](GlContext& context) {
+        const GlFunctions& gl = context.functions();
+        const GlProgram program = makeProgram(context, {{GL_COMPUTE_SHADER, kMain, {brickIndexShader()}}},
+                                              {{"BRICK_INDEX_BINDING", "0"}});
+        const GlBuffer from(context, std::span(asked));
+        const GlBuffer to(context, std::int64_t(found.size() * sizeof found[0]), 0);
+        gl.UseProgram(program.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, index.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, from.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, to.id());
+        gl.DispatchCompute(GLuint(found.size() + 63) / 64, 1, 1);
+        gl.MemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+        gl.GetNamedBufferSubData(to.id(), 0, to.bytes(), found.data());
+    });
+    return found;
+}
+
+TEST(Pool, ShadersFindBricks) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Bench bench({});
+    bench.scheduler->finish({.threads = 1});
+    const auto state = bench.pool->state();
+    const PoolOnDevice device(*bench.pool, *state);
+    std::mt19937 random(8);
+    std::vector<Vec3d> places;
+    // Places that a float holds exactly, down to the finest bricks.
+    for (int i = 0; i < 20000; ++i)
+        places.push_back(Vec3d(random() % 6144, random() % 6144, random() % 6144) / 1024.0 - 1.0);
+    const std::vector<FoundByShader> found = findByShader(bench.thread, *state->index, places);
+    int hits = 0;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        const auto want = device.walk(places[i]);
+        ASSERT_EQ(found[i].isThere, bool(want));
+        if (!want) continue;
+        ++hits;
+        ASSERT_EQ(found[i].slot, want->first);
+        ASSERT_EQ(found[i].depth, want->second);
+        const double x = places[i].x * std::ldexp(1.0, want->second);
+        ASSERT_EQ(double(found[i].inBrick), x - std::floor(x));
+    }
+    EXPECT_GT(hits, 3000);
+}
+
+TEST(Pool, ShadersFindBricksUnderAGridOfLargerCells) {
+    TESSERA_NEEDS_GL(kPlatform);
+    BrickIndex index;
+    std::vector<Vec3i> roots;
+    std::mt19937 random(9);
+    for (int i = 0; i < 100; ++i) roots.emplace_back(random() % 3000, random() % 3000, random() % 3000);
+    index.cover(roots);
+    std::vector<Vec3d> places;
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+        index.put({Depth(1), roots[i] * 2 + 1}, std::uint32_t(i));
+        places.emplace_back(Vec3d(roots[i]) + 0.75);
+        places.emplace_back(Vec3d(roots[i]) + 0.25);
+    }
+    GlThread thread(kPlatform);
+    std::vector<FoundByShader> found;
+    thread.run([&](GlContext& context) {
+        const GlBuffer words(context, index.words());
+        found = findByShader(thread, words, places);
+    });
+    for (std::size_t i = 0; i < roots.size(); ++i) {
+        ASSERT_TRUE(found[2 * i].isThere && !found[2 * i + 1].isThere);
+        ASSERT_EQ(found[2 * i].slot, i);
+        ASSERT_EQ(found[2 * i].depth, 1);
+        ASSERT_EQ(found[2 * i].inBrick, 0.5f);
+    }
 }
 
 TEST(PoolLayout, FillsTheBudget) {
