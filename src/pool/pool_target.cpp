@@ -80,7 +80,7 @@ void PoolTarget::publish(const Publication& publication) {
     const std::vector<PointValues> after = valuesNow();
     for (std::size_t i = 0; i < touched.size(); ++i)
         if (!(before[i] == after[i])) note(touched[i].leaf, touched[i].points);
-    if (!catchUp()) ++counts_.postponed;
+    if (isTooSmall() || !catchUp()) ++counts_.postponed;
 }
 
 std::vector<PoolTarget::Work> PoolTarget::codeStale() const {
@@ -103,7 +103,7 @@ std::vector<PoolTarget::Work> PoolTarget::codeStale() const {
 
 bool PoolTarget::catchUp() {
     if (!isBehind_) return true;
-    if (bricks_.leafCount() > pool_.capacity())
+    if (isTooSmall())
         throw InputError(std::to_string(bricks_.leafCount()) + " bricks are shown, and the pool holds " +
                          std::to_string(pool_.capacity()));
     if (pool_.isHeld() && pool_.freeSlots() < stale_.size()) return false;

@@ -19,15 +19,15 @@ struct PoolCounts {
     std::int64_t uploaded = 0;     ///< whole bricks
     std::int64_t changed = 0;      ///< bricks of which border values changed
     std::int64_t uploadBytes = 0;  ///< of texels
-    std::int64_t postponed = 0;    ///< publications that came when held states left no room
+    std::int64_t postponed = 0;    ///< publications that the pool had no room for at once
 };
 
 /// Fills a pool with the bricks that a scheduler shows, border values by the seam rule. The pool goes from
 /// one whole state to the next, as the scheduler does, but may be behind it: where states that frames hold
 /// leave no room for the next one it is shown by a later publication, or by catchUp().
 ///
-/// A scheduler whose budget is budgetBytes() never shows more bricks than the pool holds. With one that does,
-/// publish() throws InputError until there are fewer again, and the pool stays as it was.
+/// A scheduler whose budget is budgetBytes() never shows more bricks than the pool holds. With one that does
+/// the pool stays as it was until there are fewer again, and catchUp() throws InputError.
 class PoolTarget : public BrickTarget {
   public:
     /// Pool and mesh must outlive it; nobody else may write into the pool. @param fields those of the
@@ -42,7 +42,8 @@ class PoolTarget : public BrickTarget {
 
     /// Throws GlError when the device fails; a later call then goes on.
     void publish(const Publication& publication) override;
-    /// Shows what was published last; true when it is shown.
+    /// Shows what was published last; false when held states leave no room yet. Throws GlError as publish(),
+    /// and InputError when the pool is too small for so many bricks.
     bool catchUp();
     bool isBehind() const { return isBehind_; }
 
@@ -67,6 +68,7 @@ class PoolTarget : public BrickTarget {
         SlotUpload upload;
     };
 
+    bool isTooSmall() const { return bricks_.leafCount() > pool_.capacity(); }
     std::vector<Stale> touchedBy(const Publication& publication) const;
     void note(const GrowingLeaf& leaf, const IndexBox& points);
     InPool& inPool(std::uint32_t number);
