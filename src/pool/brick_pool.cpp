@@ -222,32 +222,38 @@ void BrickPool::giveBack(std::span<const std::uint32_t> slots) {
 
 void BrickPool::upload(std::span<const SlotUpload> uploads) {
     thread().run([&](GlContext& context) {
-        const GlFunctions& gl = context.functions();
-        const int edge = layout_.edge;
-        gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+        context.functions().PixelStorei(GL_UNPACK_ALIGNMENT, 1);
         for (const SlotUpload& upload : uploads) {
-            const int atlas = layout_.atlasOf(upload.slot);
-            const Vec3i first = layout_.firstTexel(upload.slot);
-            const Vec3i at = first + upload.part.min, size = upload.part.size();
-            const auto copy = [&](const GlTexture& from, const Vec3i& p, const GlTexture& to) {
-                gl.CopyImageSubData(from.id(), GL_TEXTURE_3D, 0, p.x, p.y, p.z, to.id(), GL_TEXTURE_3D, 0,
-                                    first.x, first.y, first.z, edge, edge, edge);
-            };
-            for (std::size_t group = 0; group < coding_.groupCount(); ++group) {
-                if (upload.copiedFrom) {
-                    const int fromAtlas = layout_.atlasOf(*upload.copiedFrom);
-                    const Vec3i from = layout_.firstTexel(*upload.copiedFrom);
-                    copy(codes(fromAtlas, group), from, codes(atlas, group));
-                    copy(coverage(fromAtlas, group), from, coverage(atlas, group));
-                }
-                gl.TextureSubImage3D(codes(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z,
-                                     coding_.pixelFormat(group), coding_.pixelType(),
-                                     upload.texels.codes[group].data());
-                gl.TextureSubImage3D(coverage(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z,
-                                     GL_RED, GL_UNSIGNED_BYTE, upload.texels.coverage[group].data());
-            }
+            if (upload.copiedFrom) copySlot(context.functions(), *upload.copiedFrom, upload.slot);
+            for (const SlotUpload::Part& part : upload.parts)
+                uploadPart(context.functions(), upload.slot, part);
         }
     });
+}
+
+void BrickPool::copySlot(const GlFunctions& gl, std::uint32_t from, std::uint32_t to) const {
+    const Vec3i there = layout_.firstTexel(from), here = layout_.firstTexel(to);
+    const int edge = layout_.edge;
+    const auto copy = [&](const GlTexture& source, const GlTexture& destination) {
+        gl.CopyImageSubData(source.id(), GL_TEXTURE_3D, 0, there.x, there.y, there.z, destination.id(),
+                            GL_TEXTURE_3D, 0, here.x, here.y, here.z, edge, edge, edge);
+    };
+    for (std::size_t group = 0; group < coding_.groupCount(); ++group) {
+        copy(codes(layout_.atlasOf(from), group), codes(layout_.atlasOf(to), group));
+        copy(coverage(layout_.atlasOf(from), group), coverage(layout_.atlasOf(to), group));
+    }
+}
+
+void BrickPool::uploadPart(const GlFunctions& gl, std::uint32_t slot, const SlotUpload::Part& part) const {
+    const int atlas = layout_.atlasOf(slot);
+    const Vec3i at = layout_.firstTexel(slot) + part.box.min, size = part.box.size();
+    for (std::size_t group = 0; group < coding_.groupCount(); ++group) {
+        gl.TextureSubImage3D(codes(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z,
+                             coding_.pixelFormat(group), coding_.pixelType(),
+                             part.texels.codes[group].data());
+        gl.TextureSubImage3D(coverage(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z, GL_RED,
+                             GL_UNSIGNED_BYTE, part.texels.coverage[group].data());
+    }
 }
 
 void BrickPool::show(BrickIndex& index, std::span<const std::uint32_t> retired) {

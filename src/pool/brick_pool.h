@@ -38,11 +38,14 @@ ShaderText brickIndexShader();
 
 /// What goes into a slot.
 struct SlotUpload {
+    struct Part {
+        IndexBox box;  ///< counted from the slot's first texel
+        Texels texels;
+    };
     std::uint32_t slot = 0;
-    /// This slot's texels come first, then those of the part.
+    /// This slot's texels come first, then those of the parts.
     std::optional<std::uint32_t> copiedFrom;
-    IndexBox part;  ///< counted from the slot's first texel
-    Texels texels;  ///< of the part
+    std::vector<Part> parts;
 };
 
 /// Bricks in the memory of an OpenGL device: slots in 3D textures, each with the (B + 1)^3 samples of a
@@ -89,6 +92,8 @@ class BrickPool {
 
   private:
     struct Device;
+    void copySlot(const GlFunctions& gl, std::uint32_t from, std::uint32_t to) const;
+    void uploadPart(const GlFunctions& gl, std::uint32_t slot, const SlotUpload::Part& part) const;
 
     TexelCoding coding_;
     SlotLayout layout_;

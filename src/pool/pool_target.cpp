@@ -12,10 +12,15 @@ namespace tessera {
 
 namespace {
 
-IndexBox unite(const IndexBox& a, const IndexBox& b) {
-    if (a.empty()) return b;
-    if (b.empty()) return a;
-    return {glm::min(a.min, b.min), glm::max(a.max, b.max)};
+bool contains(const IndexBox& outer, const IndexBox& inner) {
+    return intersect(outer, inner) == inner;
+}
+
+/// Both lie in one plane between them.
+bool areInOnePlane(const IndexBox& a, const IndexBox& b) {
+    for (int axis = 0; axis < 3; ++axis)
+        if (a.min[axis] == b.min[axis] && a.size()[axis] == 1 && b.size()[axis] == 1) return true;
+    return false;
 }
 
 }  // namespace
@@ -39,36 +44,41 @@ std::optional<std::uint32_t> PoolTarget::slotOf(const GrowingLeaf& leaf) const {
     return inPool_[leaf.slot].slot;
 }
 
-// The points of leaves that stay whose values may change.
-std::vector<PoolTarget::Stale> PoolTarget::touchedBy(const Publication& publication) const {
-    std::vector<Stale> touched;
-    for (const GrowingLeaf& leaf : publication.bordering) {
-        IndexBox points;
-        for (const GrowingLeaf& removed : publication.removed)
-            points = unite(points, bricks_.touchedPoints(leaf.key, removed.key));
-        for (const ShownBrick& added : publication.added)
-            points = unite(points, bricks_.touchedPoints(leaf.key, added.leaf.key));
-        if (!points.empty()) touched.push_back({leaf, points});
-    }
+std::vector<PoolTarget::Touched> PoolTarget::touchedBy(const Publication& publication) const {
+    std::vector<DepthKey> changed;
+    for (const GrowingLeaf& leaf : publication.removed) changed.push_back(leaf.key);
+    for (const ShownBrick& brick : publication.added) changed.push_back(brick.leaf.key);
+    std::vector<Touched> touched;
+    for (const GrowingLeaf& leaf : publication.bordering)
+        for (const IndexBox& part : bricks_.touchedPoints(leaf.key, changed)) touched.push_back({leaf, part});
     return touched;
 }
 
-void PoolTarget::note(const GrowingLeaf& leaf, const IndexBox& points) {
+std::vector<PointValues> PoolTarget::valuesOf(const std::vector<Touched>& touched) const {
+    std::vector<PointValues> values(touched.size());
+    parallelFor(execution_, std::int64_t(touched.size()), [&](std::int64_t i) {
+        const Touched& one = touched[std::size_t(i)];
+        values[std::size_t(i)] = bricks_.valuesAt(one.leaf, one.part);
+    });
+    return values;
+}
+
+// The part isn't in the pool as it is now.
+void PoolTarget::note(const GrowingLeaf& leaf, const IndexBox& part) {
     Stale& stale = stale_[leaf.slot];
-    stale = {leaf, stale.leaf == leaf ? unite(stale.points, points) : points};
+    stale.leaf = leaf;
+    for (IndexBox& noted : stale.parts) {
+        if (contains(noted, part)) return;
+        if (!areInOnePlane(noted, part)) continue;
+        noted = {glm::min(noted.min, part.min), glm::max(noted.max, part.max)};
+        return;
+    }
+    stale.parts.push_back(part);
 }
 
 void PoolTarget::publish(const Publication& publication) {
-    const std::vector<Stale> touched = touchedBy(publication);
-    const auto valuesNow = [&] {
-        std::vector<PointValues> values(touched.size());
-        parallelFor(execution_, std::int64_t(touched.size()), [&](std::int64_t i) {
-            values[std::size_t(i)] =
-                bricks_.valuesAt(touched[std::size_t(i)].leaf, touched[std::size_t(i)].points);
-        });
-        return values;
-    };
-    const std::vector<PointValues> before = valuesNow();
+    const std::vector<Touched> touched = touchedBy(publication);
+    const std::vector<PointValues> before = valuesOf(touched);
     bricks_.apply(publication, execution_);
     isBehind_ = true;
     for (const GrowingLeaf& leaf : publication.removed) {
@@ -77,26 +87,26 @@ void PoolTarget::publish(const Publication& publication) {
         if (shown.key) gone_.push_back(std::exchange(shown, {}));
     }
     for (const ShownBrick& brick : publication.added) note(brick.leaf, bricks_.closedPoints(brick.leaf.key));
-    const std::vector<PointValues> after = valuesNow();
+    const std::vector<PointValues> after = valuesOf(touched);
     for (std::size_t i = 0; i < touched.size(); ++i)
-        if (!(before[i] == after[i])) note(touched[i].leaf, touched[i].points);
+        if (!(before[i] == after[i])) note(touched[i].leaf, touched[i].part);
     if (isTooSmall() || !catchUp()) ++counts_.postponed;
 }
 
 std::vector<PoolTarget::Work> PoolTarget::codeStale() const {
     std::vector<Work> work;
-    std::vector<IndexBox> points;
-    for (const auto& [number, stale] : stale_) {
-        work.push_back({stale.leaf, {}});
-        points.push_back(stale.points);
+    std::vector<const Stale*> stale;
+    for (const auto& [number, one] : stale_) {
+        work.push_back({one.leaf, {}});
+        stale.push_back(&one);
     }
     parallelFor(execution_, std::int64_t(work.size()), [&](std::int64_t i) {
-        const GrowingLeaf& leaf = work[std::size_t(i)].leaf;
-        SlotUpload& upload = work[std::size_t(i)].upload;
-        const IndexBox& box = points[std::size_t(i)];
-        const Vec3i first = bricks_.closedPoints(leaf.key).min;
-        upload.part = {box.min - first, box.max - first};
-        upload.texels = pool_.coding().encode(bricks_.valuesAt(leaf, box));
+        const Stale& from = *stale[std::size_t(i)];
+        const Vec3i first = bricks_.closedPoints(from.leaf.key).min;
+        for (const IndexBox& part : from.parts)
+            work[std::size_t(i)].upload.parts.push_back(
+                {{part.min - first, part.max - first},
+                 pool_.coding().encode(bricks_.valuesAt(from.leaf, part))});
     });
     return work;
 }
@@ -169,9 +179,8 @@ bool PoolTarget::show(std::vector<Work>& work) {
         if (before != slot) index_.put(leaf.key, slot);
         inPool(leaf.slot) = {leaf.key, slot};
         ++(before ? counts_.changed : counts_.uploaded);
-        for (const auto& bytes : uploads[i].texels.codes) counts_.uploadBytes += std::int64_t(bytes.size());
-        for (const auto& bytes : uploads[i].texels.coverage)
-            counts_.uploadBytes += std::int64_t(bytes.size());
+        for (const SlotUpload::Part& part : uploads[i].parts)
+            counts_.uploadBytes += part.box.count() * pool_.coding().pointBytes();
     }
     stale_.clear();
     pool_.show(index_, retired_);

@@ -59,18 +59,25 @@ class PoolTarget : public BrickTarget {
         std::optional<DepthKey> key;
         std::uint32_t slot = 0;
     };
+    /// A leaf with points that the pool doesn't show yet, or of another value.
     struct Stale {
         GrowingLeaf leaf;
-        IndexBox points;
+        std::vector<IndexBox> parts;
     };
     struct Work {
         GrowingLeaf leaf;
         SlotUpload upload;
     };
+    /// Points of a leaf that stays whose values may change.
+    struct Touched {
+        GrowingLeaf leaf;
+        IndexBox part;
+    };
 
     bool isTooSmall() const { return bricks_.leafCount() > pool_.capacity(); }
-    std::vector<Stale> touchedBy(const Publication& publication) const;
-    void note(const GrowingLeaf& leaf, const IndexBox& points);
+    std::vector<Touched> touchedBy(const Publication& publication) const;
+    std::vector<PointValues> valuesOf(const std::vector<Touched>& touched) const;
+    void note(const GrowingLeaf& leaf, const IndexBox& part);
     InPool& inPool(std::uint32_t number);
     std::vector<Work> codeStale() const;
     bool show(std::vector<Work>& work);
@@ -82,7 +89,7 @@ class PoolTarget : public BrickTarget {
     ShownBricks bricks_;
     BrickIndex index_;  // numbers are slots
     std::vector<InPool> inPool_;
-    std::map<std::uint32_t, Stale> stale_;  // by number of the leaf: what the pool doesn't show yet
+    std::map<std::uint32_t, Stale> stale_;  // by number of the leaf
     std::vector<InPool> gone_;              // what it shows and isn't published any more
     std::vector<std::uint32_t> retired_;    // slots that the index left, but not yet what is shown
     bool isBehind_ = false;

@@ -24,11 +24,29 @@ void forEachPoint(const IndexBox& box, Visit&& visit) {
             for (p.x = box.min.x; p.x < box.max.x; ++p.x) visit(p);
 }
 
-int ceilDiv(int a, int b) {
-    return -floorDiv(-a, b);
-}
-
 }  // namespace
+
+// Nearest mesh points of places of which each is mostly near the one before: that bounds the search.
+class ShownBricks::NearestWalk {
+  public:
+    explicit NearestWalk(const NearestOnDemand& nearest) : nearest_(nearest) {}
+
+    NearestPoint find(const Vec3d& placeWorld) {
+        constexpr double kRounding = 1 + 1e-9;
+        const double most = (distance_ + glm::length(placeWorld - last_)) * kRounding;
+        NearestPoint found = nearest_.get().find(placeWorld, most);
+        if (found.element < 0)
+            found = nearest_.get().find(placeWorld, std::numeric_limits<double>::infinity());
+        last_ = placeWorld;
+        if (found.element >= 0) distance_ = found.distanceWorld;
+        return found;
+    }
+
+  private:
+    const NearestOnDemand& nearest_;
+    Vec3d last_{0};
+    double distance_ = std::numeric_limits<double>::infinity();  // of the mesh from the last place
+};
 
 bool operator==(const PointValues& a, const PointValues& b) {
     return a.covered == b.covered && a.values.size() == b.values.size() &&
@@ -89,16 +107,19 @@ bool ShownBricks::isOnBorder(const Vec3i& local) const {
 void ShownBricks::findOutside(Leaf& leaf) const {
     const Block& samples = *leaf.samples;
     std::vector<double> values(channelOf_.size());
+    NearestWalk walk(nearest_);
     forEachPoint(samples.box, [&](const Vec3i& p) {
         if (samples.covered(p) || !isOnBorder(p - samples.box.min)) return;
-        nearestValues(leaf, p, values);
+        nearestValues(leaf, p, walk, values);
         leaf.outside.push_back(std::uint32_t(samples.offset(p)));
         leaf.outsideValues.insert(leaf.outsideValues.end(), values.begin(), values.end());
     });
 }
 
 // At a point outside the mesh, in the closed box of a leaf.
-void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, std::span<double> values) const {
+void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
+                                std::span<double> values) const {
+    if (values.empty()) return;
     const auto offset = std::uint32_t(leaf.samples->offset(p));
     const auto known = std::lower_bound(leaf.outside.begin(), leaf.outside.end(), offset);
     if (known != leaf.outside.end() && *known == offset) {
@@ -107,11 +128,7 @@ void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, std::span<doub
         return;
     }
     const Lattice& lattice = leaf.samples->lattice;
-    const Vec3d place = lattice.worldFromIndex(Vec3d(p));
-    // Most points lie within a voxel of the mesh; a short search first is cheaper.
-    const NearestPointIndex& nearest = nearest_.get();
-    NearestPoint found = nearest.find(place, 4 * lattice.uWorld.x);
-    if (found.element < 0) found = nearest.find(place, std::numeric_limits<double>::infinity());
+    const NearestPoint found = walk.find(lattice.worldFromIndex(Vec3d(p)));
     for (std::size_t c = 0; c < values.size(); ++c) {
         const auto [field, component] = channelOf_[c];
         values[c] = found.element < 0 ? kNone : found.value(mesh_.fields[std::size_t(field)], component);
@@ -124,11 +141,12 @@ const ShownBricks::Leaf* ShownBricks::findCovering(const DepthKey& key) const {
     return found ? &leaves_[found->number] : nullptr;
 }
 
-PointSource ShownBricks::ownSample(const Leaf& leaf, const Vec3i& p, std::span<double> values) const {
+PointSource ShownBricks::ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
+                                   std::span<double> values) const {
     const Block& samples = *leaf.samples;
     const std::size_t offset = samples.offset(p);
     if (samples.coverage[offset] == 0) {
-        nearestValues(leaf, p, values);
+        nearestValues(leaf, p, walk, values);
         return PointSource::nearest;
     }
     for (std::size_t c = 0; c < values.size(); ++c) {
@@ -141,7 +159,7 @@ PointSource ShownBricks::ownSample(const Leaf& leaf, const Vec3i& p, std::span<d
 // `asking` is a leaf of this depth whose closed box holds p. `near` gives the leaf that covers a brick.
 template <class Near>
 PointSource ShownBricks::resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near,
-                                 std::span<double> values) const {
+                                 NearestWalk& walk, std::span<double> values) const {
     const Vec3i brick = floorDiv(p, cells_);
     const Vec3i rest = p - brick * cells_;
     // The bricks of this depth whose closed boxes hold p: the owner, and on each axis where p lies on a
@@ -155,24 +173,24 @@ PointSource ShownBricks::resolve(Depth depth, const Vec3i& p, const Leaf& asking
         if (side == 0) own = leaf;
         if (leaf && leaf->leaf.key.depth < coarsest->leaf.key.depth) coarsest = leaf;
     }
-    if (coarsest != &asking) return fromCoarse(depth, p, *coarsest, values);
-    if (own) return ownSample(*own, p, values);
+    if (coarsest != &asking) return fromCoarse(depth, p, *coarsest, walk, values);
+    if (own) return ownSample(*own, p, walk, values);
     if (const auto finer = index_.findOwner(depth, p, cells_)) {
         const int times = 1 << (finer->key.depth - depth);
-        return ownSample(leaves_[finer->number], p * times, values);
+        return ownSample(leaves_[finer->number], p * times, walk, values);
     }
-    nearestValues(asking, p, values);
+    nearestValues(asking, p, walk, values);
     return PointSource::nearest;
 }
 
-PointSource ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse,
+PointSource ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, NearestWalk& walk,
                                     std::span<double> values) const {
     const Depth above = coarse.leaf.key.depth;
     const int step = 1 << (depth - above);
     const Vec3i cell = floorDiv(p, step);
     const Vec3d t = Vec3d(p - cell * step) / double(step);
     const auto near = [&](const DepthKey& key) { return findCovering(key); };
-    if (t == Vec3d(0)) return resolve(above, cell, coarse, near, values);
+    if (t == Vec3d(0)) return resolve(above, cell, coarse, near, walk, values);
     PointSource source = PointSource::covered;
     std::array<double, 16> few;
     std::vector<double> many;
@@ -182,7 +200,7 @@ PointSource ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coa
     for (int c = 0; c < 8; ++c) {
         const double weight = cornerWeight(t, c);
         if (weight == 0) continue;
-        source = std::min(source, resolve(above, cell + cornerOffset(c), coarse, near, corner));
+        source = std::min(source, resolve(above, cell + cornerOffset(c), coarse, near, walk, corner));
         for (std::size_t v = 0; v < values.size(); ++v) values[v] += weight * corner[v];
     }
     return source;
@@ -200,39 +218,57 @@ PointValues ShownBricks::valuesAt(const GrowingLeaf& asked, const IndexBox& poin
         const Vec3i by = other.index - key.index + 1;
         return around[std::size_t(by.x + 3 * by.y + 9 * by.z)];
     };
+    NearestWalk walk(nearest_);
     PointValues result;
     const std::size_t channels = channelOf_.size();
     result.values.resize(std::size_t(points.count()) * channels);
-    result.covered.reserve(std::size_t(points.count()));
+    result.covered.resize(std::size_t(points.count()));
+    std::size_t n = 0;
     forEachPoint(points, [&](const Vec3i& p) {
-        const std::span<double> values(result.values.data() + result.covered.size() * channels, channels);
+        const std::span<double> values(result.values.data() + n * channels, channels);
         const bool isInside = !isOnBorder(p - leaf.samples->box.min);
         const PointSource source =
-            isInside ? ownSample(leaf, p, values) : resolve(key.depth, p, leaf, near, values);
-        result.covered.push_back(source == PointSource::covered);
+            isInside ? ownSample(leaf, p, walk, values) : resolve(key.depth, p, leaf, near, walk, values);
+        result.covered[n++] = source == PointSource::covered;
     });
     return result;
 }
 
-IndexBox ShownBricks::touchedPoints(const DepthKey& leaf, const DepthKey& changed) const {
-    IndexBox box = closedPoints(changed);
-    box.max -= 1;  // its last points
-    for (int a = 0; a < 3; ++a) {
-        if (changed.depth <= leaf.depth) {
-            const int times = 1 << (leaf.depth - changed.depth);
-            box.min[a] *= times, box.max[a] *= times;
-        } else {
-            const int step = 1 << (changed.depth - leaf.depth);
-            box.min[a] = floorDiv(box.min[a], step), box.max[a] = ceilDiv(box.max[a], step);
-        }
-    }
-    box.max += 1;
+std::vector<IndexBox> ShownBricks::touchedPoints(const DepthKey& leaf,
+                                                 std::span<const DepthKey> changed) const {
     const IndexBox closed = closedPoints(leaf);
-    if (intersect(closed, box).empty()) return {};
+    IndexBox touched;
+    for (const DepthKey& key : changed) {
+        const IndexBox shared = intersect(closed, pointsInside(key, leaf.depth));
+        if (shared.empty()) continue;
+        touched = touched.empty()
+                      ? shared
+                      : IndexBox{glm::min(touched.min, shared.min), glm::max(touched.max, shared.max)};
+    }
+    std::vector<IndexBox> parts;
+    if (touched.empty()) return parts;
     // A point on the border to a coarser leaf depends on the corners of its cell there, one voxel away at
     // most, as two leaves that touch differ by one depth.
-    box.min -= 1, box.max += 1;
-    return intersect(closed, box);
+    touched = intersect(closed, {touched.min - 1, touched.max + 1});
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int plane : {closed.min[axis], closed.max[axis] - 1}) {
+            if (plane < touched.min[axis] || plane >= touched.max[axis]) continue;
+            IndexBox& part = parts.emplace_back(touched);
+            part.min[axis] = plane, part.max[axis] = plane + 1;
+        }
+    return parts;
+}
+
+// The points of a depth's lattice in the closed box of a brick of any depth, and those next to it where that
+// lies between points.
+IndexBox ShownBricks::pointsInside(const DepthKey& key, Depth depth) const {
+    const Vec3i first = key.index * cells_, last = (key.index + 1) * cells_;
+    if (key.depth <= depth) {
+        const int times = 1 << (depth - key.depth);
+        return {first * times, last * times + 1};
+    }
+    const int step = 1 << (key.depth - depth);
+    return {floorDiv(first, step), floorDiv(last + (step - 1), step) + 1};
 }
 
 }  // namespace tessera

@@ -46,9 +46,9 @@ class ShownBricks {
 
     /// Of points in the closed box of a leaf shown, x fastest.
     PointValues valuesAt(const GrowingLeaf& leaf, const IndexBox& points) const;
-    /// The points in the closed box of a leaf, as a box, whose values may change when leaves come or go
-    /// inside a brick; empty when there are none.
-    IndexBox touchedPoints(const DepthKey& leaf, const DepthKey& changed) const;
+    /// The points of a leaf whose values may change when leaves come or go inside these bricks: parts of its
+    /// border, each in one plane; they may overlap.
+    std::vector<IndexBox> touchedPoints(const DepthKey& leaf, std::span<const DepthKey> changed) const;
 
   private:
     struct Leaf {
@@ -59,14 +59,19 @@ class ShownBricks {
         std::vector<std::uint32_t> outside;
         std::vector<double> outsideValues;
     };
+    class NearestWalk;
+
     template <class Near>
-    PointSource resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near,
+    PointSource resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near, NearestWalk& walk,
                         std::span<double> values) const;
-    PointSource fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, std::span<double> values) const;
-    PointSource ownSample(const Leaf& leaf, const Vec3i& p, std::span<double> values) const;
-    void nearestValues(const Leaf& leaf, const Vec3i& p, std::span<double> values) const;
+    PointSource fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, NearestWalk& walk,
+                           std::span<double> values) const;
+    PointSource ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
+                          std::span<double> values) const;
+    void nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& walk, std::span<double> values) const;
     void findOutside(Leaf& leaf) const;
     const Leaf* findCovering(const DepthKey& key) const;
+    IndexBox pointsInside(const DepthKey& key, Depth depth) const;
     bool isOnBorder(const Vec3i& local) const;
 
     const TetMesh& mesh_;
