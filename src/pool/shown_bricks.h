@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "brick/seams.h"
+#include "pool/brick_index.h"
+#include "schedule/brick_target.h"
+#include "tessera/execution.h"
+#include "tessera/mesh.h"
+
+namespace tessera {
+
+/// The values of some points, point by point: channels() each. Beside each point whether it is covered.
+struct PointValues {
+    std::vector<double> values;  ///< NaN where a value isn't finite
+    std::vector<std::uint8_t> covered;
+    friend bool operator==(const PointValues& a, const PointValues& b);  ///< bit for bit
+};
+
+/// The leaves that a scheduler shows, with their samples, and the seam rule over them: the values that
+/// Reconstruction gives over a tree and a store of the same leaves, bit for bit, for leaves that come and go.
+/// Reading is thread-safe while nothing is applied.
+class ShownBricks {
+  public:
+    /// @param fields indices into mesh.fields: the channels of the samples. The mesh and `nearest` must
+    /// outlive it. @param brickCells of every brick, an even number.
+    ShownBricks(const TetMesh& mesh, std::span<const int> fields, int brickCells,
+                const NearestOnDemand& nearest);
+
+    /// Takes leaves away and adds others. Throws InternalError when a leaf to remove doesn't stand.
+    void apply(const Publication& publication, const Execution& execution);
+
+    int channels() const { return int(channelOf_.size()); }
+    int brickCells() const { return cells_; }
+    std::size_t leafCount() const { return leafCount_; }
+    /// Whether exactly this leaf stands.
+    bool isShown(const GrowingLeaf& leaf) const;
+    /// The closed box of a brick in the lattice of its depth: (B + 1)^3 points.
+    IndexBox closedPoints(const DepthKey& key) const {
+        return {key.index * cells_, (key.index + 1) * cells_ + 1};
+    }
+
+    /// Of points in the closed box of a leaf shown, x fastest.
+    PointValues valuesAt(const GrowingLeaf& leaf, const IndexBox& points) const;
+    /// The points of a leaf whose values may change when leaves come or go inside these bricks: parts of its
+    /// border, each in one plane; they may overlap.
+    std::vector<IndexBox> touchedPoints(const DepthKey& leaf, std::span<const DepthKey> changed) const;
+
+  private:
+    struct Leaf {
+        GrowingLeaf leaf;
+        std::shared_ptr<const Block> samples;  ///< null: no leaf has this number
+        /// Values of points on the brick's border that are outside the mesh: their offsets in the closed box,
+        /// ascending, and their channels.
+        std::vector<std::uint32_t> outside;
+        std::vector<double> outsideValues;
+    };
+    class NearestWalk;
+
+    template <class Near>
+    PointSource resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near, NearestWalk& walk,
+                        std::span<double> values) const;
+    PointSource fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, NearestWalk& walk,
+                           std::span<double> values) const;
+    PointSource ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
+                          std::span<double> values) const;
+    void nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& walk, std::span<double> values) const;
+    void findOutside(Leaf& leaf) const;
+    const Leaf* findCovering(const DepthKey& key) const;
+    IndexBox pointsInside(const DepthKey& key, Depth depth) const;
+    bool isOnBorder(const Vec3i& local) const;
+
+    const TetMesh& mesh_;
+    const NearestOnDemand& nearest_;
+    int cells_;
+    std::vector<std::pair<int, int>> channelOf_;  // (field, component) of each channel
+    std::vector<Leaf> leaves_;                    // by GrowingLeaf::slot
+    std::size_t leafCount_ = 0;
+    BrickIndex index_;  // with GrowingLeaf::slot as the number
+};
+
+}  // namespace tessera
