@@ -332,13 +332,15 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
         expectIndex(bench, random, 1000);
         expectNoStep(bench, random, 10, acrossDepths);
     }
+    // The same bricks at the end, however far the updates came.
+    bench.scheduler->setFocus({pointFocus({0, 0.1, 0.3}, 0.12)});
     bench.scheduler->finish({.threads = 1});
     expectPool(bench, seen);
     expectNoStep(bench, random, 20, acrossDepths);
     EXPECT_GT(seen.texels, 50000);
     EXPECT_GT(seen.uncovered, 1000);
     EXPECT_EQ(seen.invalid > 10, setting.fields.size() > 1);
-    EXPECT_GT(acrossDepths, 100);
+    EXPECT_GT(acrossDepths, 50);
     EXPECT_GT(bench.target->counts().changed, 0);
     EXPECT_EQ(bench.target->counts().postponed, 0);
     bench.scheduler.reset();
