@@ -16,8 +16,10 @@
 
 namespace tessera {
 
+/// How large a pool is.
 struct PoolOptions {
-    /// Of all slots; the index comes on top, about 40 bytes for every eight leaves and state in use.
+    /// Of all slots. The index comes on top: 50 bytes at most for every brick that is split, in three copies
+    /// and one for each further state that is held.
     std::int64_t budgetBytes = std::int64_t(1) << 30;
     /// Texels along an edge are bounded by the device too.
     AtlasLimits limits;
@@ -53,7 +55,7 @@ struct SlotUpload {
 /// them and shows them; slots that were shown before come back when no state holds them and the device has
 /// done what was asked of it until then. Texels are those of TexelCoding; places those of SlotLayout.
 ///
-/// Its functions may be called on any thread, one at a time; on the OpenGL thread they run at once.
+/// Its functions may be called on any thread: they are tasks of the OpenGL thread, where they run at once.
 class BrickPool {
   public:
     /// Takes the device's memory. The thread must outlive the pool. Throws InputError for a budget that holds
@@ -67,7 +69,8 @@ class BrickPool {
     std::size_t capacity() const { return layout_.capacity(); }
     /// Of textures and buffers.
     std::int64_t deviceBytes() const;
-    /// Textures of a group in an atlas; not filtered as they come. To be used on the OpenGL thread.
+    /// Textures of a group in an atlas; not filtered unless a sampler says so. To be used on the OpenGL
+    /// thread.
     const GlTexture& codes(int atlas, std::size_t group) const;
     const GlTexture& coverage(int atlas, std::size_t group) const;
 

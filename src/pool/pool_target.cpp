@@ -25,11 +25,10 @@ bool areInOnePlane(const IndexBox& a, const IndexBox& b) {
 
 }  // namespace
 
-PoolTarget::PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields,
-                       const Execution& execution)
+PoolTarget::PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields, int threads)
     : pool_(pool),
-      execution_(execution.withoutProgress()),
-      nearest_(mesh, execution.threads),
+      execution_{.threads = threads},
+      nearest_(mesh, threads),
       bricks_(mesh, fields, pool.brickCells(), nearest_) {
     TESSERA_CHECK(pool.coding().channels() == bricks_.channels(), "a pool of other channels");
 }

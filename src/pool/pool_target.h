@@ -31,11 +31,12 @@ struct PoolCounts {
 class PoolTarget : public BrickTarget {
   public:
     /// Pool and mesh must outlive it; nobody else may write into the pool. @param fields those of the
-    /// scheduler. @param execution of its own work, by as many threads: coding, and values outside the mesh.
-    PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields,
-               const Execution& execution = {});
+    /// scheduler. @param threads of its own work, coding and values outside the mesh; 0: one for every
+    /// processor.
+    PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields, int threads = 0);
 
-    /// For ScheduleOptions::budgetBytes, with BrickScheduler::brickBytes().
+    /// For ScheduleOptions::budgetBytes, with BrickScheduler::brickBytes(). Less keeps the pool from falling
+    /// behind while frames hold states: by the slots that change during a frame.
     std::int64_t budgetBytes(std::int64_t brickBytes) const {
         return std::int64_t(pool_.capacity()) * brickBytes;
     }

@@ -349,8 +349,8 @@ bool BrickScheduler::merge(const DepthKey& key) {
     if (!tree_.merge(key)) return false;
     splits_.erase(key);
     const TreeChange change = tree_.change();
-    publish(&key, change.removed, change.added);
     for (const GrowingLeaf& leaf : change.removed) memory_.release(leaf.key);
+    publish(&key, change.removed, change.added);
     return true;
 }
 

@@ -37,6 +37,7 @@ TetMesh meshWithFields(TetMesh mesh) {
     return mesh;
 }
 
+// TESSERA_POOL_UPDATES asks for more.
 int updatesAsked(int otherwise) {
     const char* text = std::getenv("TESSERA_POOL_UPDATES");
     return text ? std::atoi(text) : otherwise;
@@ -47,8 +48,8 @@ enum class Algorithm { software, slicing };
 struct Setting {
     SampleFormat format = SampleFormat::r32f;
     Algorithm algorithm = Algorithm::software;
-    int budgetBricks = 250;
-    int poolBricks = 400;
+    int budgetBricks = 180;
+    int poolBricks = 300;
     int atlasTexels = 1024;
     int resolution = 249;
     std::vector<int> fields{0, kLinear, 2};
@@ -81,7 +82,7 @@ class Bench {
         poolOptions.budgetBytes = setting.poolBricks * 9 * 9 * 9 * coding.pointBytes();
         poolOptions.limits.texels = setting.atlasTexels;
         pool = std::make_unique<BrickPool>(thread, kCells, coding, poolOptions);
-        target = std::make_unique<PoolTarget>(*pool, mesh, fields, Execution{.threads = setting.threads});
+        target = std::make_unique<PoolTarget>(*pool, mesh, fields, setting.threads);
         scheduler = std::make_unique<BrickScheduler>(mesh, fields, *resampler, options, *target);
     }
 
@@ -316,12 +317,12 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     if (setting.format == SampleFormat::r32f) setting.threads = 3;
     if (setting.format == SampleFormat::r16f) setting.fields = {kLinear};
     if (setting.format == SampleFormat::r16) setting.fields = {0, 2, kLinear, 2, 0, 2};
-    if (setting.format == SampleFormat::r8) setting.atlasTexels = 50, setting.hasBounds = true;
+    if (setting.format == SampleFormat::r8) setting.atlasTexels = 40, setting.hasBounds = true;
     Bench bench(setting);
     EXPECT_EQ(bench.pool->layout().atlases > 3, setting.format == SampleFormat::r8);
     std::mt19937 random(unsigned(setting.format) + 7);
-    const int updates = updatesAsked(isSlow ? 8 : 60);
-    const int every = isSlow ? 4 : 30;
+    const int updates = updatesAsked(isSlow ? 4 : 40);
+    const int every = isSlow ? 4 : 20;
     Seen seen;
     int acrossDepths = 0;
     for (int step = 1; step <= updates && !HasFailure(); ++step) {
@@ -331,13 +332,15 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
         expectIndex(bench, random, 1000);
         expectNoStep(bench, random, 10, acrossDepths);
     }
+    // The same bricks at the end, however far the updates came.
+    bench.scheduler->setFocus({pointFocus({0, 0.1, 0.3}, 0.12)});
     bench.scheduler->finish({.threads = 1});
     expectPool(bench, seen);
     expectNoStep(bench, random, 20, acrossDepths);
     EXPECT_GT(seen.texels, 50000);
     EXPECT_GT(seen.uncovered, 1000);
     EXPECT_EQ(seen.invalid > 10, setting.fields.size() > 1);
-    EXPECT_GT(acrossDepths, 100);
+    EXPECT_GT(acrossDepths, 50);
     EXPECT_GT(bench.target->counts().changed, 0);
     EXPECT_EQ(bench.target->counts().postponed, 0);
     bench.scheduler.reset();
@@ -388,15 +391,15 @@ TEST(Pool, StatesThatAreHeldStay) {
 
 TEST(Pool, ThatIsJustLargeEnoughIsNeverBehind) {
     TESSERA_NEEDS_GL(kPlatform);
-    Bench bench({.format = SampleFormat::r8, .budgetBricks = 216, .poolBricks = 216});
-    ASSERT_EQ(bench.pool->capacity(), 216u);
+    Bench bench({.format = SampleFormat::r8, .budgetBricks = 150, .poolBricks = 150});
+    ASSERT_EQ(bench.pool->capacity(), 150u);
     EXPECT_EQ(bench.target->budgetBytes(bench.scheduler->brickBytes()), bench.options.budgetBytes);
     std::mt19937 random(6);
     Seen seen;
-    for (int round = 0; round < 6; ++round) {
+    for (int round = 0; round < 4; ++round) {
         bench.jump(random);
         bench.scheduler->finish({.threads = 1});
-        if (round % 3 == 2) expectPool(bench, seen);
+        if (round % 2 == 1) expectPool(bench, seen);
     }
     EXPECT_EQ(bench.target->counts().postponed, 0);
 }
