@@ -13,10 +13,13 @@ std::string focusTraceText(const FocusTraceRequest& request, const FocusTrace& t
 /// "6 moves: better after 1.2 ms (median) and 8.1 ms (99 %), at rest after ...", without an end.
 std::string focusSummaryText(const std::vector<FocusStep>& steps);
 
-// Figures as people read them.
-std::string shortMilliseconds(double ms);  ///< "0.42", "12.3", "1,234"
-std::string shareAsPercent(double share);  ///< "0.13 %", "< 0.001 %"
-/// "of a moving focus ...": the mesh, the algorithm, spacing, radius, threads: a sentence without its end.
+/// "9 places of points.txt in flow.vtu ...": the mesh, the algorithm, spacing, radius, threads, without an
+/// end.
 std::string focusTraceSetup(const FocusTraceRequest& request, const FocusTrace& trace, const Job& job);
+
+/// "0.42", "12.3", "1,234".
+std::string shortMilliseconds(double ms);
+/// "0.13 %", "< 0.001 %".
+std::string shareAsPercent(double share);
 
 }  // namespace tessera
