@@ -89,7 +89,7 @@ int runSlice(const SliceArguments& a) {
 
 int runFocusTrace(const FocusTraceArguments& a) {
     FocusTraceRequest request = a.request;
-    request.budgetBytes = parseCount("--budget", a.budget, true);
+    request.budgetBytes = parseCount("--budget", a.budget, false);
     request.algorithm = a.algorithm.name;
     request.bind = bindOptions(a.algorithm);
     if (!a.fields.empty()) request.fields = parseFields(a.fields);

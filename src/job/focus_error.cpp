@@ -10,6 +10,10 @@ namespace tessera {
 
 namespace {
 
+/// By rounding, a place on a lattice plane may lie in the cell on either side: corners that have less of a
+/// say than this may be outside the mesh.
+constexpr double kLeastWeight = 1e-9;
+
 /// The value at a place within the block's box; nothing where its cell isn't wholly covered and finite.
 std::optional<double> interpolate(const Block& block, int channel, const Vec3d& placeWorld) {
     const Vec3d index = (placeWorld - block.lattice.originWorld) / block.lattice.uWorld.x;
@@ -18,9 +22,11 @@ std::optional<double> interpolate(const Block& block, int channel, const Vec3d& 
     double value = 0;
     for (int n = 0; n < 8; ++n) {
         const Vec3i offset(n & 1, n >> 1 & 1, n >> 2);
+        const Vec3d shares = glm::mix(1.0 - share, share, Vec3d(offset));
+        const double weight = shares.x * shares.y * shares.z;
+        if (weight < kLeastWeight) continue;
         if (!block.covered(corner + offset)) return std::nullopt;
-        const Vec3d weight = glm::mix(1.0 - share, share, Vec3d(offset));
-        value += weight.x * weight.y * weight.z * double(block.value(channel, corner + offset));
+        value += weight * double(block.value(channel, corner + offset));
     }
     if (!std::isfinite(value)) return std::nullopt;
     return value;

@@ -21,8 +21,8 @@ struct FocusTraceRequest {
     int resolution = 0;       ///< lattice points along the longest axis, of the finest spacing; 0: not given
     double spacingWorld = 0;  ///< the finest; 0: not given. Neither: that of 256 points
     int brickCells = 16;
-    std::int64_t budgetBytes = std::int64_t(1) << 30;  ///< of bricks in memory
-    double frameMs = 8;                                ///< of one update
+    std::int64_t budgetBytes = 1'000'000'000;  ///< of bricks in memory
+    double frameMs = 8;                        ///< of one update
     std::string algorithm = "software";
     BindOptions bind;
     std::vector<FieldChoice> fields;  ///< empty: all

@@ -16,7 +16,7 @@ namespace tessera {
 namespace {
 
 constexpr const char* kStyle = R"(
-body { margin: 2rem auto; padding: 0 1rem; max-width: 72rem; background: #fff; color: #222;
+body { margin: 2rem auto; padding: 0 1rem; max-width: 78rem; background: #fff; color: #222;
   font: 16px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
 h1 { font-size: 1.5rem; margin-bottom: .5rem; overflow-wrap: anywhere; }
 p { max-width: 50rem; overflow-wrap: anywhere; }
@@ -158,8 +158,8 @@ void StepPlot::addSeries(const StepValues& values, const char* colour, std::stri
 void StepPlot::addLevel(double value, const char* colour, std::string_view what) {
     svg_ += fmt::format(
         "<line x1='{0}' x2='{1}' y1='{2:.1f}' y2='{2:.1f}' stroke='{3}' stroke-dasharray='6 4'/><text "
-        "x='{1}' y='{4:.1f}' text-anchor='end'>{5}</text>\n",
-        kPlotLeft, kPlotRight, y(value), colour, y(value) - 5, what);
+        "x='{5}' y='{4:.1f}'>{6}</text>\n",
+        kPlotLeft, kPlotRight, y(value), colour, y(value) - 5, kPlotLeft + 8, what);
 }
 
 void StepPlot::addStillMarks(const std::vector<FocusStep>& steps) {
@@ -226,7 +226,7 @@ struct PageColumn {
 };
 
 std::string plainNumber(double value) {
-    return fmt::format("{:.6g}", value);
+    return fmt::format("{:.5g}", value);
 }
 
 constexpr const char* kNoCell = "&ndash;";

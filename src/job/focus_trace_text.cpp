@@ -95,7 +95,8 @@ std::string focusSummaryText(const std::vector<FocusStep>& steps) {
 std::string focusTraceSetup(const FocusTraceRequest& request, const FocusTrace& trace, const Job& job) {
     const int threads = job.execution.threadCount();
     return fmt::format(
-        "{} places of {} in {} ({} elements), {} on {} thread{}, finest spacing {:.4g}, radius {:.4g}, "
+        "{} places of {} in {} ({} elements), sampled by {} on {} thread{}, finest spacing {:.4g}, radius "
+        "{:.4g}, "
         "updates of {:g} ms, at most {} of bricks",
         formatCount(std::int64_t(trace.steps.size())),
         std::filesystem::path(request.path).filename().string(),
