@@ -2,7 +2,7 @@ set(TESSERA_PYTHON /usr/bin/python3 CACHE FILEPATH "Python with Debian's modules
 add_test(NAME layering_test COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.py)
 
 if(TARGET tessera)
-  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Programs Refinement Slices Series Compare Reader Terminal Help)
+  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Programs Refinement Slices FocusTraces Series Compare Reader Terminal Help)
     add_test(NAME app_test.${suite}
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
@@ -36,7 +36,7 @@ endif()
 # What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
 # nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
 set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams measure extend oracle
-  contract_checker contract_format contract_test hard_cases perturbed vdb image library)
+  contract_checker contract_format contract_test hard_cases perturbed vdb image library cache)
 if(TESSERA_SANITIZE MATCHES thread)
   set(sanitized_areas base gl_test compare software contract_test brick_store refine schedule seams measure)
 endif()

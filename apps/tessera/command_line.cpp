@@ -20,6 +20,7 @@ namespace tessera {
 namespace {
 
 constexpr std::size_t kHelpColumn = 34;  // where descriptions begin
+constexpr double kLeastLength = 1e-300, kLargestLength = 1e300;
 
 /// Numbers from `first` to `last`; says so in plain figures.
 CLI::Validator numbersWithin(double first, double last) {
@@ -448,6 +449,63 @@ void addSliceOptions(CLI::App& command, SliceArguments& a) {
         "  tessera slice flow.vtu -o near.exr --origin 1,2,0 --normal 0,0,1 --size 0.5 --resolution 4096");
 }
 
+void addFocusTraceOptions(CLI::App& command, FocusTraceArguments& a) {
+    const std::string where = "Where to sample how finely";
+    FocusTraceRequest& r = a.request;
+    command.add_option("mesh", r.input, "a mesh file")->required();
+    command
+        .add_option("--path", r.path,
+                    "a text file of the places that the focus moves to: a line x y z each, in world units; # "
+                    "begins a comment")
+        ->required();
+    command.add_option("-o,--output", r.output,
+                       "a .csv file (a line a step) or a .html file (a page with plots and a table); - for "
+                       "standard output; without, a table is printed and nothing written");
+    addFormat(command, r.format, {"csv", "html"});
+    command
+        .add_option("--radius", r.radiusWorld,
+                    "distance from the focus up to which spacing is the finest; beyond, it grows in "
+                    "proportion to the distance")
+        ->required()
+        ->check(numbersWithin(kLeastLength, kLargestLength))
+        ->group(where);
+    auto* resolution =
+        command
+            .add_option("--resolution", r.resolution,
+                        "lattice points along the longest axis, at the finest level (default: 256)")
+            ->check(CLI::Range(2, 1 << 20))
+            ->group(where);
+    command.add_option("--spacing", r.spacingWorld, "spacing of the finest level, in world units")
+        ->check(numbersWithin(kLeastLength, kLargestLength))
+        ->excludes(resolution)
+        ->group(where);
+    command.add_option("--brick-size", r.brickCells, "cells along a brick's edge: 8, 16, 32 or 64")
+        ->check(CLI::IsMember({8, 16, 32, 64}))
+        ->capture_default_str()
+        ->group(where);
+    command.add_option("--budget", a.budget, "memory that all bricks together may take, e.g. 500M")
+        ->capture_default_str()
+        ->group(where);
+    command.add_option("--frame-ms", r.frameMs, "milliseconds that one update samples for")
+        ->check(numbersWithin(0.01, 60000))
+        ->capture_default_str()
+        ->group(where);
+    command.add_option("--field", a.fields,
+                       "fields to sample: a,b (default: all); errors are those of the first one that has "
+                       "values at points, its first component");
+    addTimeStep(command, r.timeStep);
+    addAlgorithmOptions(command, a.algorithm);
+    addRepairOptions(command, a.repair);
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Moves a focus along the path and waits at each place until all bricks are as fine as wished for. "
+        "Tells when the brick at the focus became finer, when everything was at rest, how many bricks were "
+        "sampled, reused and dropped, and how far the samples near the focus are from the mesh.\n"
+        "Examples:\n  tessera focus-trace flow.vtu --path points.txt --radius 0.2\n"
+        "  tessera focus-trace flow.vtu --path points.txt --radius 0.2 -o trace.html --budget 500M\n"
+        "  tessera focus-trace flow.vtu --path points.txt --radius 0.2 -o trace.csv --resolution 1024");
+}
+
 void addCompareOptions(CLI::App& command, CompareArguments& a) {
     command.add_option("mesh", a.request.meshes, "mesh files")->required();
     command.add_option(
@@ -550,6 +608,8 @@ void describe(CLI::App& app, CommandLine& line) {
                addPaperTablesOptions, runPaperTables);
     addCommand(app, line, "slice", "cut a mesh with any plane: a float EXR or a .png", addSliceOptions,
                runSlice);
+    addCommand(app, line, "focus-trace", "replay a moving focus: times, bricks and errors, step by step",
+               addFocusTraceOptions, runFocusTrace);
 }
 
 /// Lines that a terminal would break anywhere, broken between words. Descriptions stay in their column.

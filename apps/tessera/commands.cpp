@@ -87,6 +87,18 @@ int runSlice(const SliceArguments& a) {
     return 0;
 }
 
+int runFocusTrace(const FocusTraceArguments& a) {
+    FocusTraceRequest request = a.request;
+    request.budgetBytes = parseCount("--budget", a.budget, false);
+    request.algorithm = a.algorithm.name;
+    request.bind = bindOptions(a.algorithm);
+    if (!a.fields.empty()) request.fields = parseFields(a.fields);
+    request.repair = repairOptions(a.repair);
+    Session session(a.common, request.output);
+    session.writeReport(focusTraceJson(request, traceFocus(request, session.job), session.job));
+    return session.exitCode();
+}
+
 int runCompare(const CompareArguments& a) {
     CompareRequest request = a.request;
     request.bind = bindOptions(a.algorithm);

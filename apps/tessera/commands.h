@@ -7,6 +7,7 @@
 #include "job/describe_files.h"
 #include "job/draw_vdb.h"
 #include "job/export_tets.h"
+#include "job/focus_trace.h"
 #include "job/paper_tables.h"
 #include "job/verify_file.h"
 #include "options.h"
@@ -41,6 +42,13 @@ struct SliceArguments {
     std::string origin, normal = "0,0,1", up, size, fields, range;
     CutRequest request;
 };
+struct FocusTraceArguments {
+    CommonOptions common;
+    RepairArguments repair;
+    AlgorithmArguments algorithm;
+    std::string fields, budget = "1G";
+    FocusTraceRequest request;
+};
 struct CompareArguments {
     CommonOptions common;
     RepairArguments repair;
@@ -63,5 +71,6 @@ int runPicture(const PictureArguments& arguments);
 int runCompare(const CompareArguments& arguments);
 int runPaperTables(const PaperTablesArguments& arguments);
 int runSlice(const SliceArguments& arguments);
+int runFocusTrace(const FocusTraceArguments& arguments);
 
 }  // namespace tessera

@@ -4,7 +4,9 @@
 usage: app_test.py --tessera PROGRAM --data FOLDER [unittest arguments]
 """
 
+import csv
 import fcntl
+import html.parser
 import json
 import os
 import pathlib
@@ -1130,6 +1132,154 @@ class Slices(AppTest):
         self.reject_slice("finite", "--field", "f", mesh="nan.vtu", output="cut.png")
 
 
+class PageParser(html.parser.HTMLParser):
+    """Counts tags, and notes what a page would load or leaves open."""
+
+    VOID = {"meta", "br", "path", "line", "circle"}
+
+    def __init__(self, text):
+        super().__init__()
+        self.counts, self.open, self.text, self.loaded = {}, [], "", []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        self.loaded += [value for name, value in attributes if name in ("src", "href")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+
+    def handle_endtag(self, tag):
+        if tag in self.VOID:
+            return
+        assert self.open and self.open[-1] == tag, f"</{tag}> within {self.open}"
+        self.open.pop()
+
+    def handle_data(self, text):
+        self.text += text
+
+
+class FocusTraces(AppTest):
+    """tessera focus-trace."""
+
+    COLUMNS = "step x y z moved better_ms rest_ms sampled reused dropped leaves voxels bytes spacing relative_max relative_rms nodes nodes_near cut_short"
+    # To the sphere, away, hardly moved, and back.
+    PATH = "# a path\n1 0 0\n\n-4, 1,1  # away\n-4 1 1.001\r\n1,0,0\n"
+
+    def setUp(self):
+        super().setUp()
+        self.write("path.txt", self.PATH)
+
+    def command(self, *options, path="path.txt", mesh=None):
+        return ["focus-trace", mesh or self.stokes, "--path", path, "--radius", "1", *options]
+
+    def rows(self, *options, **command):
+        self.succeed(*self.command("-o", "trace.csv", "--quiet", *options, **command))
+        with open(self.folder / "trace.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(list(rows[0]), self.COLUMNS.split())
+        return rows
+
+    def test_csv_has_a_row_a_step_and_coming_back_samples_nothing(self):
+        rows = self.rows()
+        self.assertEqual([[float(row[k]) for k in ("step", "x", "y", "z")] for row in rows], [[1, 1, 0, 0], [2, -4, 1, 1], [3, -4, 1, 1.001], [4, 1, 0, 0]])
+        for row in rows:
+            self.assertEqual(int(row["voxels"]), int(row["leaves"]) * 16**3)
+            self.assertEqual(float(row["spacing"]), 20 / 255)
+            self.assertEqual(row["cut_short"], "false")
+            self.assertLessEqual(int(row["nodes"]), int(row["nodes_near"]))
+        first, away, still, back = rows
+        for row in (first, away, back):
+            self.assertEqual(row["moved"], "true")
+            self.assertGreater(float(row["rest_ms"]), float(row["better_ms"]))
+        self.assertGreater(int(away["sampled"]), 0)
+        self.assertEqual([still[k] for k in ("moved", "better_ms", "sampled", "reused")], ["false", "", "0", "0"])
+        self.assertEqual(back["sampled"], "0")
+        self.assertGreater(int(back["reused"]), 0)
+        for key in ("leaves", "spacing", "relative_max", "relative_rms", "nodes"):
+            self.assertEqual(back[key], first[key])
+        self.assertGreater(int(first["nodes"]), 100)
+        self.assertLess(0, float(first["relative_rms"]))
+        self.assertLess(float(first["relative_rms"]), float(first["relative_max"]))
+
+    def test_a_linear_field_is_shown_as_it_is(self):
+        # A node within the cube; all corners but (1, 1, 0) are within the radius too.
+        inner = (0.4, 0.45, 0.6)
+        centre = len(CUBE_POINTS)
+        faces = [(0, 1, 3), (0, 3, 2), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 3, 7), (1, 7, 5)]
+        points = [*CUBE_POINTS, inner]
+        self.write("inner.vtu", vtu_text(points, [(*face, centre) for face in faces], fields={"f": [p[0] - 2 * p[1] + 3 for p in points]}))
+        self.write("path.txt", "0.4 0.45 0.6")
+        row = self.rows("--resolution", "50", mesh="inner.vtu")[0]
+        self.assertEqual((row["nodes"], row["nodes_near"]), ("8", "8"))
+        self.assertLess(float(row["relative_max"]), 1e-6)
+        # Where the lattice ends within the cube only its first corner and the node within have a whole cell.
+        row = self.rows("--spacing", "0.03", mesh="inner.vtu")[0]
+        self.assertEqual((row["nodes"], row["nodes_near"]), ("2", "8"))
+        # A peak at the node within: trilinear cells cut it off, and the corners are as they were.
+        self.write("peak.vtu", vtu_text(points, [(*face, centre) for face in faces], fields={"f": [0.0] * 8 + [1.0]}))
+        row = self.rows("--resolution", "10", mesh="peak.vtu")[0]
+        self.assertGreater(float(row["relative_max"]), 0.01)
+        self.assertAlmostEqual(float(row["relative_max"]) / 8**0.5, float(row["relative_rms"]), places=6)
+
+    def test_page_stands_alone(self):
+        self.write("a<b&c.vtu", self.stokes.read_bytes())
+        self.succeed(*self.command("-o", "trace.HTML", "--quiet", mesh="a<b&c.vtu"))
+        page = PageParser((self.folder / "trace.HTML").read_text(encoding="utf-8"))
+        self.assertEqual(page.open, [])
+        self.assertEqual((page.counts["svg"], page.counts["table"], page.counts["tr"]), (1, 1, 5))
+        self.assertEqual(page.loaded, [])
+        self.assertNotIn("script", page.counts)
+        # Three times to better, three to rest, four of memory.
+        self.assertEqual(page.counts["circle"], 10)
+        for words in ("a<b&c.vtu (18,598 elements)", "by software on", "finest spacing 0.07843", "radius 1", "milliseconds", "MB", "step of the path", "jitter"):
+            self.assertIn(words, page.text)
+
+    def test_report_and_table_tell_the_same(self):
+        report = self.report(*self.command())
+        self.assertEqual(list(report["steps"][0]), self.COLUMNS.split())
+        self.assertEqual((report["output"], report["error_field"], report["finest_spacing"]), (None, "pressure", 20 / 255))
+        self.assertEqual((report["summary"]["moves"], report["summary"]["too_small"], report["summary"]["rest"]["count"]), (2, 1, 2))
+        self.assertIsNone(report["steps"][2]["better_ms"])
+        text = self.succeed(*self.command())
+        self.assertRegex(text, r"\n +3 +jitter +0.00 +0 +0 +0 ")
+        self.assertRegex(text, r"2 moves: better after [0-9.,]+ ms \(median\) and [0-9.,]+ ms \(99 %\), at rest after [0-9.,]+ ms \(median\)")
+        self.assertEqual(sorted(os.listdir(self.folder)), ["cube.vtu", "path.txt"])
+        for line in text.splitlines():
+            if re.search(r"\S  +\S", line):
+                self.assertLessEqual(len(line), 80, text)
+
+    def test_small_budget_drops_bricks_and_warns_when_it_cuts_short(self):
+        rows = self.rows("--budget", "8M", "--field", "pressure")
+        self.assertGreater(sum(int(row["dropped"]) for row in rows), 0)
+        for row in rows:
+            self.assertLessEqual(int(row["bytes"]), 8000000)
+        result = self.run_tessera(*self.command("-o", "trace.csv", "--quiet", "--budget", "2M", "--field", "pressure"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stderr, "^tessera: warning: .*--budget")
+        self.assertIn(",true\n", (self.folder / "trace.csv").read_text())
+
+    def test_bad_input_says_what_is_wrong(self):
+        for line, text in ((2, "0 0 0\n1 2\n"), (3, "# places\n\n1 2 x\n")):
+            self.write("bad.txt", text)
+            self.reject(2, f"bad.txt, line {line}:", *self.command("-o", "trace.csv", path="bad.txt"))
+        self.write("none.txt", "# nothing\n")
+        self.reject(2, "none.txt place", *self.command("-o", "trace.csv", path="none.txt"))
+        self.reject(2, "nothing.txt", *self.command(path="nothing.txt"))
+        self.reject(2, ".csv .html '.txt'", *self.command("-o", "trace.txt"))
+        self.reject(2, "--format", *self.command("--format", "csv"))
+        self.reject(2, "would replace path.txt", *self.command("-o", "path.csv", "--json", "path.txt"))
+        self.reject(2, "--radius", "focus-trace", self.cube, "--path", "path.txt")
+        self.reject(2, "--radius 0", "focus-trace", self.cube, "--path", "path.txt", "--radius", "0")
+        self.reject(2, "--spacing", *self.command("--spacing", "1", "--resolution", "9"))
+        self.reject(2, "--budget", *self.command("--budget", "none"))
+        self.reject(2, "budget 1000 small", *self.command("--budget", "1K"))
+        self.reject(1, "nowhere/trace.csv", *self.command("-o", "nowhere/trace.csv"))
+
+
 class Series(AppTest):
     def setUp(self):
         super().setUp()
@@ -1606,7 +1756,7 @@ class Terminal(AppTest):
 
 class Help(AppTest):
     def test_every_command_has_help_with_an_example(self):
-        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"]):
+        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"], ["focus-trace"]):
             text = self.succeed(*command, "--help")
             self.assertIn("Example", text)
         self.reject(2, "no command 'resmaple'", "resmaple", "mesh.vtu")

@@ -5,7 +5,10 @@
 #include <filesystem>
 #include <sstream>
 
+#include "files/atomic_file.h"
 #include "job/describe_files.h"
+#include "job/focus_path.h"
+#include "job/focus_trace.h"
 #include "job/resample_files.h"
 #include "job/verify_file.h"
 #include "tessera/error.h"
@@ -92,6 +95,43 @@ TEST_F(JobTest, tablesKeepToTheirWidth) {
     std::size_t count = 0;
     for (std::string line; std::getline(lines, line); ++count) EXPECT_LE(line.size(), 44u) << line;
     EXPECT_GT(count, 2u);
+}
+
+TEST_F(JobTest, aFocusPathIsAPlaceALine) {
+    writeFileAtomically(file("path.txt"), "# places\n1 2 3\n\n \t-1e2,0.5 , .25\t# here\r\n0 -0 1e-300");
+    const std::vector<Vec3d> expected{{1, 2, 3}, {-100, 0.5, 0.25}, {0, 0, 1e-300}};
+    EXPECT_EQ(readFocusPath(file("path.txt")), expected);
+}
+
+TEST_F(JobTest, aBadLineOfAFocusPathIsNamed) {
+    for (const std::string bad : {"1 2", "1 2 3 4", "1 2 x", "1,,2,3", ",1 2 3", "1 2 3,", "nan 0 0",
+                                  "0 inf 0", "1e999 0 0", "1;2;3", "1-2 3 4", "1 2 3x"}) {
+        writeFileAtomically(file("path.txt"), "0 0 0\n" + bad + "\n1 1 1\n");
+        try {
+            readFocusPath(file("path.txt"));
+            ADD_FAILURE() << bad;
+        } catch (const InputError& error) {
+            const std::string text = error.what();
+            EXPECT_NE(text.find("path.txt, line 2: expected"), std::string::npos) << text;
+            EXPECT_NE(text.find("'" + bad + "'"), std::string::npos) << text;
+        }
+    }
+    writeFileAtomically(file("path.txt"), "\n# nothing\n");
+    EXPECT_THROW(readFocusPath(file("path.txt")), InputError);
+    EXPECT_THROW(readFocusPath(file("other.txt")), InputError);
+}
+
+TEST_F(JobTest, aFocusTraceThatIsCancelledLeavesNothing) {
+    writeFileAtomically(file("path.txt"), "50 50 50");
+    FocusTraceRequest trace;
+    trace.input = kMesh;
+    trace.path = file("path.txt");
+    trace.output = file("trace.csv");
+    trace.radiusWorld = 1;
+    const std::atomic<bool> stop = true;
+    job.execution.cancel = &stop;
+    EXPECT_THROW(traceFocus(trace, job), Cancelled);
+    EXPECT_FALSE(fs::exists(trace.output));
 }
 
 }  // namespace
