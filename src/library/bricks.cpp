@@ -55,8 +55,7 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->options.algorithm = choice.resampler->name();
     parts->options.fields.clear();
     for (const BrickField& field : parts->chosen.described) parts->options.fields.push_back(field.name);
-    parts->result =
-        makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
+    parts->result = makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
     if (!choice.reason.empty()) parts->result.notes.insert(parts->result.notes.begin(), choice.reason);
     // Names in a mesh needn't be unique.
     for (std::size_t f = 0; f < parts->chosen.described.size(); ++f)
