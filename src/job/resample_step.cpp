@@ -56,10 +56,10 @@ std::shared_ptr<BrickArchive> openLog(const TetMesh& mesh, const StepPlan& plan,
     checkOptions(mesh, box, plan.refine);
     std::string algorithm = resampler.name();
     if (!resampler.info().targetsAgree)
-        algorithm +=
-            " " + (plan.refine.bind.target.empty() ? resampler.targets().front() : plan.refine.bind.target);
+        algorithm += fmt::format(
+            " {}", plan.refine.bind.target.empty() ? resampler.targets().front() : plan.refine.bind.target);
     if (plan.refine.bind.format != SampleFormat::r32f)
-        algorithm += " " + std::string(nameOf(plan.refine.bind.format));
+        algorithm += fmt::format(" {}", nameOf(plan.refine.bind.format));
     return std::make_shared<BrickLog>(
         path, BrickLog::describe(mesh, plan.selection.fields, algorithm, chooseFrame(box, plan.refine)));
 }
