@@ -65,10 +65,12 @@ std::string focusTraceCsv(const FocusTrace& trace) {
         const Json step = focusStepJson(trace.steps[i], i + 1);
         std::string header, line;
         for (const auto& [key, value] : step.items()) {
-            header += (header.empty() ? "" : ",") + key;
-            line += (line.empty() ? "" : ",") + csvCell(value);
+            if (!header.empty()) header += ',', line += ',';
+            header += key;
+            line += csvCell(value);
         }
-        text += (i == 0 ? header + "\n" : "") + line + "\n";
+        if (i == 0) text += header + '\n';
+        text += line + '\n';
     }
     return text;
 }
