@@ -1266,13 +1266,9 @@ class FocusTraces(AppTest):
         for line, text in ((2, "0 0 0\n1 2\n"), (3, "# places\n\n1 2 x\n")):
             self.write("bad.txt", text)
             self.reject(2, f"bad.txt, line {line}:", *self.command("-o", "trace.csv", path="bad.txt"))
-        self.write("none.txt", "# nothing\n")
-        self.reject(2, "none.txt place", *self.command("-o", "trace.csv", path="none.txt"))
-        self.reject(2, "nothing.txt", *self.command(path="nothing.txt"))
         self.reject(2, ".csv .html '.txt'", *self.command("-o", "trace.txt"))
         self.reject(2, "--format", *self.command("--format", "csv"))
         self.reject(2, "would replace path.txt", *self.command("-o", "path.csv", "--json", "path.txt"))
-        self.reject(2, "--radius", "focus-trace", self.cube, "--path", "path.txt")
         self.reject(2, "--radius 0", "focus-trace", self.cube, "--path", "path.txt", "--radius", "0")
         self.reject(2, "--spacing", *self.command("--spacing", "1", "--resolution", "9"))
         self.reject(2, "--budget", *self.command("--budget", "none"))
