@@ -38,7 +38,7 @@ class WatchedBricks : public BrickTarget {
         // Of a brick and its children one side is removed, the other one added.
         const auto areBelow = [](const auto& keys, const DepthKey& key) {
             for (const DepthKey& below : keys)
-                if (ancestorKey(below, key.depth) != key || below == key) return false;
+                if (below.depth <= key.depth || ancestorKey(below, key.depth) != key) return false;
             return true;
         };
         std::vector<DepthKey> removed, added;
