@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "lattice/copy_points.h"
 #include "resample/bound_mesh.h"
 #include "resample/check_lattice.h"
 
@@ -57,16 +58,7 @@ void StoppableSampling::copy(const Block& piece) {
         block_.values.assign(block_.count() * std::size_t(piece.channels), 0.0f);
         block_.coverage.assign(block_.count(), 0);
     }
-    const int length = piece.box.size().x;
-    Vec3i p = piece.box.min;
-    for (p.z = piece.box.min.z; p.z < piece.box.max.z; ++p.z)
-        for (p.y = piece.box.min.y; p.y < piece.box.max.y; ++p.y) {
-            const std::size_t from = piece.offset(p), to = block_.offset(p);
-            std::copy_n(piece.coverage.data() + from, length, block_.coverage.data() + to);
-            for (int c = 0; c < piece.channels; ++c)
-                std::copy_n(piece.channel(c).data() + from, length,
-                            block_.values.data() + std::size_t(c) * block_.count() + to);
-        }
+    copyPoints(piece, piece.box, block_);
 }
 
 bool StoppableSampling::step(std::int64_t elements, const Execution& execution) {

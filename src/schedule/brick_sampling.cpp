@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "lattice/copy_points.h"
 
 namespace tessera {
 
@@ -46,16 +47,7 @@ std::shared_ptr<const Block> cut(const Block& from, const IndexBox& box) {
     part->channels = from.channels;
     part->values.resize(std::size_t(from.channels) * part->count());
     part->coverage.resize(part->count());
-    const int length = box.size().x;
-    Vec3i p = box.min;
-    for (p.z = box.min.z; p.z < box.max.z; ++p.z)
-        for (p.y = box.min.y; p.y < box.max.y; ++p.y) {
-            const std::size_t source = from.offset(p), target = part->offset(p);
-            std::copy_n(from.coverage.data() + source, length, part->coverage.data() + target);
-            for (int c = 0; c < from.channels; ++c)
-                std::copy_n(from.channel(c).data() + source, length,
-                            part->values.data() + std::size_t(c) * part->count() + target);
-        }
+    copyPoints(from, box, *part);
     return part;
 }
 
