@@ -45,9 +45,12 @@ WishPlan::WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit)
 }
 
 double WishPlan::wishedSpacing(MeshBricks::Number brick) const {
-    if (!isSeen(brick)) return kNoWish;
-    return std::min({bricks_.wishedByElementSize(brick), wishedByError(brick),
-                     wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick))});
+    return isSeen(brick) ? std::min(wishedWithoutErrors(brick), wishedByError(brick)) : kNoWish;
+}
+
+double WishPlan::wishedWithoutErrors(MeshBricks::Number brick) const {
+    return std::min(bricks_.wishedByElementSize(brick),
+                    wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
 }
 
 // Trilinear errors fall with the square of the spacing.
@@ -73,9 +76,7 @@ double WishPlan::costOfSplit(MeshBricks::Number brick) const {
 double WishPlan::valueOfSplit(MeshBricks::Number brick) const {
     if (!isSeen(brick)) return 0;
     const double spacing = bricks_.spacingWorld(brick);
-    const double wished =
-        std::min(bricks_.wishedByElementSize(brick),
-                 wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    const double wished = wishedWithoutErrors(brick);
     if (!isTooCoarse(spacing, wished)) return valueOfError(brick);
     const double gain = holdsFocus(wishes_.focus, bricks_.boxWorld(brick)) ? kFocusGain : 1;
     return gain * (1 + benefitOfSplit(spacing, wished)) / costOfSplit(brick);
@@ -98,9 +99,7 @@ double WishPlan::valueOfError(MeshBricks::Number brick) const {
 void WishPlan::consider(MeshBricks::Number brick) {
     const DepthKey& key = bricks_.key(brick);
     if (key.depth >= bricks_.frame().maxDepth || !isSeen(brick)) return;
-    const double wished =
-        std::min(bricks_.wishedByElementSize(brick),
-                 wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    const double wished = wishedWithoutErrors(brick);
     if (isTooCoarse(bricks_.spacingWorld(brick), wished)) {
         candidates_.push_back({valueOfSplit(brick), brick, key});
         std::push_heap(candidates_.begin(), candidates_.end());

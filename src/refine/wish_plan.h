@@ -89,6 +89,7 @@ class WishPlan {
         }
     };
 
+    double wishedWithoutErrors(MeshBricks::Number brick) const;
     double wishedByError(MeshBricks::Number brick) const;
     double costOfSplit(MeshBricks::Number brick) const;
     double valueOfError(MeshBricks::Number brick) const;
