@@ -10,27 +10,6 @@ namespace {
 /// Smaller differences of a colour can't be seen: half a step of eight bits.
 constexpr float kSeen = 1.0f / 512;
 
-using Rgba = std::array<double, 4>;
-
-Rgba shownAs(const TransferFunction::Stop& stop) {
-    return {stop.color[0] * stop.opacity, stop.color[1] * stop.opacity, stop.color[2] * stop.opacity,
-            stop.opacity};
-}
-
-Rgba shownAt(const std::vector<TransferFunction::Stop>& stops, double value) {
-    const auto above = std::find_if(stops.begin(), stops.end(),
-                                    [&](const TransferFunction::Stop& stop) { return stop.value > value; });
-    if (above == stops.begin()) return shownAs(stops.front());
-    if (above == stops.end()) return shownAs(stops.back());
-    const TransferFunction::Stop& below = *(above - 1);
-    const double t = (value - below.value) / (above->value - below.value);
-    TransferFunction::Stop between;
-    between.opacity = below.opacity + t * (above->opacity - below.opacity);
-    for (std::size_t c = 0; c < 3; ++c)
-        between.color[c] = below.color[c] + t * (above->color[c] - below.color[c]);
-    return shownAs(between);
-}
-
 }  // namespace
 
 VisibleValues::VisibleValues(const TransferFunction& function, const ValueRange& range) {
@@ -49,13 +28,13 @@ VisibleValues::VisibleValues(const TransferFunction& function, const ValueRange&
         Shown& shown = bins[std::size_t(b)];
         std::fill_n(shown.least, 4, std::numeric_limits<float>::infinity());
         std::fill_n(shown.most, 4, -std::numeric_limits<float>::infinity());
-        const auto include = [&](const Rgba& rgba) {
+        const auto include = [&](const std::array<double, 4>& rgba) {
             for (std::size_t c = 0; c < 4; ++c) {
                 shown.least[c] = std::min(shown.least[c], float(rgba[c]));
                 shown.most[c] = std::max(shown.most[c], float(rgba[c]));
             }
         };
-        for (const double value : values) include(shownAt(function.stops, value));
+        for (const double value : values) include(shownAt(function, value));
         // A step has two colours.
         for (const TransferFunction::Stop& stop : function.stops)
             if (stop.value >= from && stop.value <= to) include(shownAs(stop));
