@@ -7,6 +7,10 @@ if(TARGET tessera)
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data ${suite})
   endforeach()
+  # What the tests in Python run, beside tessera: it looks for the reading process where it is itself.
+  tessera_program(forked_tessera PRECOMPILED tessera_app_precompiled SOURCES app/forked_tessera.cpp PRIVATE_LINK tessera_app)
+  target_include_directories(forked_tessera PRIVATE ${PROJECT_SOURCE_DIR}/apps/tessera)
+  set_target_properties(forked_tessera PROPERTIES RUNTIME_OUTPUT_DIRECTORY $<TARGET_FILE_DIR:tessera>)
   # An algorithm from outside src/: two files and one registration.
   tessera_program(tessera_with_oracle SOURCES ${PROJECT_SOURCE_DIR}/apps/tessera/main.cpp app/register_oracle.cpp contract/oracle_resampler.cpp
     LINK reference PRIVATE_LINK tessera_app)

@@ -23,9 +23,12 @@ import termios
 import time
 import unittest
 
+from forked_tessera import ForkedTessera
+
 from signal_handlers import catches
 
 TESSERA = ""
+FORKED = None
 DATA = pathlib.Path()
 
 CUBE_POINTS = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
@@ -71,6 +74,8 @@ class AppTest(unittest.TestCase):
         return path
 
     def run_tessera(self, *arguments, **options):
+        if not options:
+            return FORKED.run(arguments, self.folder)
         return subprocess.run([TESSERA, *map(str, arguments)], capture_output=True, text=True, timeout=300, cwd=self.folder, **options)
 
     def succeed(self, *arguments, **options):
@@ -1762,6 +1767,7 @@ class Help(AppTest):
 if __name__ == "__main__":
     arguments = sys.argv[1:]
     TESSERA = str(pathlib.Path(arguments[arguments.index("--tessera") + 1]).resolve())
+    FORKED = ForkedTessera(TESSERA)
     DATA = pathlib.Path(arguments[arguments.index("--data") + 1]).resolve()
     rest = [a for i, a in enumerate(arguments) if a not in ("--tessera", "--data") and (i == 0 or arguments[i - 1] not in ("--tessera", "--data"))]
     unittest.main(argv=[sys.argv[0], *rest])

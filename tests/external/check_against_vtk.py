@@ -9,9 +9,9 @@ A disagreement counts unless the point lies within 1 % of a voxel of the mesh bo
 """
 
 import argparse
+import functools
 import json
 import pathlib
-import subprocess
 import sys
 import tempfile
 import time
@@ -28,8 +28,14 @@ FLOAT_ULP = 2.0**-23
 MESH_SUFFIXES = (".vtu", ".vts", ".vtk")
 
 
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "app"))
+from forked_tessera import ForkedTessera  # noqa: E402
+
+forked = functools.cache(ForkedTessera)
+
+
 def call(tool, *arguments):
-    result = subprocess.run([tool, *map(str, arguments)], capture_output=True, text=True)
+    result = forked(tool).run(arguments)
     if result.returncode != 0:
         raise RuntimeError(f"tessera {' '.join(map(str, arguments))}: exit {result.returncode}: {result.stderr.strip()}")
     return result.stdout
