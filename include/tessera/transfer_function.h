@@ -25,6 +25,11 @@ struct TransferFunction {
     friend bool operator==(const TransferFunction&, const TransferFunction&);
 };
 
+/// What a stop looks like: red, green and blue, each multiplied by the opacity, and the opacity.
+std::array<double, 4> shownAs(const TransferFunction::Stop& stop);
+/// The same of a finite value; at a step, of what stands above it.
+std::array<double, 4> shownAt(const TransferFunction& function, double value);
+
 /// Throws InputError for stops out of order or out of range, and for none.
 void checkTransferFunction(const TransferFunction& function);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "base/parallel.h"
 
@@ -363,6 +364,60 @@ bool ElementIndex::clip(const Box3d& boxWorld, MappedBox& box) const {
     return true;
 }
 
+/// A grid's planes, in shares of the mesh's bounds: on each axis every whole number.
+struct ElementIndex::Comb {
+    std::array<float, 3> scale, low, high;  // place * scale + low or high, of a box enlarged by the margin
+
+    /// Null where floats don't tell the planes apart.
+    static std::optional<Comb> make(const ElementIndex& index, const PointGrid& grid) {
+        constexpr double kMostPlanes = 1 << 15, kRounding = 0x1p-6;
+        Comb comb;
+        for (int a = 0; a < 3; ++a) {
+            const double phase = (index.boundsWorld_.min[a] - grid.originWorld[a]) / grid.spacingWorld[a];
+            const double planes = 1 / (index.scale_[a] * grid.spacingWorld[a]);
+            const double margin = grid.margin + kRounding;
+            const double first = phase - std::floor(phase) + std::ceil(margin) + 1;  // numbers stay positive
+            if (!(planes < kMostPlanes && std::abs(phase) < 0x1p40)) return {};
+            comb.scale[std::size_t(a)] = float(planes);
+            comb.low[std::size_t(a)] = float(first - margin);
+            comb.high[std::size_t(a)] = float(first + margin);
+        }
+        return comb;
+    }
+
+    bool meets(const MappedBox& box) const {
+        bool all = true;
+        for (std::size_t a = 0; a < 3; ++a)
+            all &= float(std::int32_t(box.max[a] * scale[a] + high[a])) >= box.min[a] * scale[a] + low[a];
+        return all;
+    }
+};
+
+// Calls visit(element) for those in the box that some point of the comb may be near.
+template <class Visit>
+void ElementIndex::comb(std::size_t level, std::int64_t n, const MappedBox& box, const Comb& points,
+                        const Visit& visit) const {
+    const Node& node = levels_[level][std::size_t(n)];
+    const Meetings<kWidth> meeting(node, box);
+    for (std::size_t c = 0; c < kWidth; ++c) {
+        if (!meeting.meets[c]) continue;
+        const MappedBox below = child(node, c);
+        if (!points.meets(below)) continue;
+        const std::int64_t number = n * kWidth + std::int64_t(c);
+        if (level > 0) {
+            comb(level - 1, number, box, points, visit);
+            continue;
+        }
+        const Group& group = groups_[std::size_t(number)];
+        const std::span<const std::int32_t> elements = elementsBelow(level, number);
+        unsigned met = metInGroup(group, stepsWithin(box, below), elements.size());
+        for (; met != 0; met &= met - 1) {
+            const auto i = std::size_t(std::countr_zero(met));
+            if (points.meets(element(group, i, below))) visit(elements[i]);
+        }
+    }
+}
+
 void ElementIndex::query(std::size_t level, std::int64_t n, const MappedBox& box, std::size_t most,
                          std::vector<std::int32_t>& elements) const {
     const Node& node = levels_[level][std::size_t(n)];
@@ -406,17 +461,27 @@ std::int64_t ElementIndex::count(std::size_t level, std::int64_t n, const Mapped
     return sum;
 }
 
-void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements, std::size_t most) const {
+void ElementIndex::query(const Box3d& boxWorld, std::vector<std::int32_t>& elements, std::size_t most,
+                         const PointGrid* grid) const {
     MappedBox box;
     if (!clip(boxWorld, box)) return;
     const std::size_t first = elements.size();
-    query(levels_.size() - 1, 0, box, most, elements);
+    const std::optional<Comb> points = grid ? Comb::make(*this, *grid) : std::nullopt;
+    if (points)
+        comb(levels_.size() - 1, 0, box, *points, [&](std::int32_t e) { elements.push_back(e); });
+    else
+        query(levels_.size() - 1, 0, box, most, elements);
     if (elements.size() <= most) sortEachOnce(elements, first);
 }
 
-std::int64_t ElementIndex::count(const Box3d& boxWorld) const {
+std::int64_t ElementIndex::count(const Box3d& boxWorld, const PointGrid* grid) const {
     MappedBox box;
-    return clip(boxWorld, box) ? count(levels_.size() - 1, 0, box, 0) : 0;
+    if (!clip(boxWorld, box)) return 0;
+    const std::optional<Comb> points = grid ? Comb::make(*this, *grid) : std::nullopt;
+    if (!points) return count(levels_.size() - 1, 0, box, 0);
+    std::int64_t sum = 0;
+    comb(levels_.size() - 1, 0, box, *points, [&](std::int32_t) { ++sum; });
+    return sum;
 }
 
 std::int64_t ElementIndex::countAbout(const Box3d& boxWorld) const {

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
-#include "tessera/error.h"
+#include "refine/camera_view.h"
 
 namespace tessera {
 
@@ -27,17 +25,9 @@ Focus boxFocus(const Box3d& boxWorld, double radiusWorld) {
 }
 
 Focus cameraFocus(const Camera& camera, double finestSpacingWorld) {
-    const double half = camera.openingDegrees * std::numbers::pi / 360;
-    constexpr double kFar = std::numeric_limits<double>::infinity();
-    const Vec3d right = glm::cross(camera.forwardWorld, camera.upWorld);
-    if (!(half > 0 && half < std::numbers::pi / 2) || camera.widthPixels < 1 || camera.heightPixels < 1 ||
-        !(glm::length(camera.eyeWorld) < kFar) || !(glm::length(right) > 0) || !(glm::length(right) < kFar))
-        throw InputError(
-            "a camera needs an opening between 0 and 180 degrees, pixels, and a direction forward that isn't "
-            "the one up");
-    const Vec3d forward = glm::normalize(camera.forwardWorld), side = glm::normalize(right),
-                up = glm::cross(side, forward);
-    const double high = std::tan(half), wide = high * camera.widthPixels / camera.heightPixels;
+    const CameraView view = viewOf(camera);
+    const Vec3d &forward = view.forward, &side = view.right, &up = view.up;
+    const double wide = view.wide, high = view.high;
     // At the distance r a pixel is as large as the finest spacing.
     Focus focus = pointFocus(camera.eyeWorld, finestSpacingWorld * camera.heightPixels / (2 * high));
     for (const Vec3d& normal :

@@ -65,6 +65,18 @@ std::optional<MeshBricks::Number> MeshBricks::find(const DepthKey& key) const {
     return number;
 }
 
+// The brick, when it is there: the bricks above are looked at, if none has done so.
+std::optional<MeshBricks::Number> MeshBricks::look(const DepthKey& key) {
+    Number number = rootNumbers_.at(ancestorKey(key, Depth(0)).index);
+    if (number-- == 0) return {};
+    for (Depth depth(1); depth <= key.depth; depth = depth + 1) {
+        const unsigned child = childNumber(ancestorKey(key, depth).index);
+        if (!(children(number) >> child & 1)) return {};
+        number = bricks_[number].firstChild + child;
+    }
+    return number;
+}
+
 // An element that touches a child shows that the child is there: a few elements show all inside a mesh.
 void MeshBricks::findChildren(Number brick) {
     const DepthKey key = bricks_[brick].key;
@@ -108,9 +120,33 @@ ChildBits MeshBricks::children(Number brick) {
     return bricks_[brick].children;
 }
 
-Box3d MeshBricks::boxWorld(Number brick) const {
-    const double edge = spacingWorld(brick) * frame_.brickCells;
-    const Vec3d low = frame_.originWorld + Vec3d(key(brick).index) * edge;
+std::span<const MeshBricks::Number> MeshBricks::nearParents(Number brick) {
+    const DepthKey key = bricks_[brick].key;
+    if (key.depth == Depth(0)) return {};
+    if (bricks_[brick].nearParents == 0) {
+        NearParents near;
+        for (unsigned n = 0; n < 8; ++n) {
+            const DepthKey at{key.depth - 1, ((key.index - 1) >> 1) + childOffset(n)};
+            if (at.index == key.index >> 1) continue;
+            if (const auto number = look(at)) near.numbers[near.count++] = *number;
+        }
+        nearParents_.push_back(near);
+        bricks_[brick].nearParents = Number(nearParents_.size());
+    }
+    const NearParents& near = nearParents_[bricks_[brick].nearParents - 1];
+    return {near.numbers.data(), near.count};
+}
+
+ChildBoxes MeshBricks::childBoxesWorld(Number brick) const {
+    const DepthKey key = bricks_[brick].key;
+    ChildBoxes boxes;
+    for (int half = 0; half < 2; ++half) boxes.halves[half] = boxWorld({key.depth + 1, key.index * 2 + half});
+    return boxes;
+}
+
+Box3d MeshBricks::boxWorld(const DepthKey& key) const {
+    const double edge = frame_.spacingWorld(key.depth) * frame_.brickCells;
+    const Vec3d low = frame_.originWorld + Vec3d(key.index) * edge;
     Box3d box{glm::max(low, frame_.meshBoundsWorld.min), glm::min(low + edge, frame_.meshBoundsWorld.max)};
     if (frame_.boundsWorld) {
         box.min = glm::max(box.min, frame_.boundsWorld->min);

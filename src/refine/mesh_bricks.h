@@ -15,6 +15,7 @@
 #include "refine/brick_findings.h"
 #include "refine/brick_plan.h"
 #include "refine/visible_values.h"
+#include "refine/wishes.h"
 #include "tessera/execution.h"
 #include "tessera/mesh.h"
 
@@ -40,14 +41,22 @@ class MeshBricks {
     /// A brick that was looked at, as all the leaves of a plan were.
     std::optional<Number> find(const DepthKey& key) const;
     const DepthKey& key(Number brick) const { return bricks_[brick].key; }
+    /// Numbers are below it; it grows as bricks are looked at.
+    std::size_t count() const { return bricks_.size(); }
     /// The closed box of the brick, within the mesh's bounds and those of the frame; world units.
-    Box3d boxWorld(Number brick) const;
+    Box3d boxWorld(Number brick) const { return boxWorld(key(brick)); }
+    /// The same of all eight children, whether they are there or not.
+    ChildBoxes childBoxesWorld(Number brick) const;
     double spacingWorld(Number brick) const { return frame_.spacingWorld(key(brick).depth); }
 
     /// Which children there are.
     ChildBits children(Number brick);
     /// One of the children that there are.
     Number child(Number brick, unsigned child) const { return bricks_[brick].firstChild + child; }
+
+    /// The bricks one depth above that touch the brick from outside its parent: balance wants them split
+    /// before the brick is. In an order that depends on the brick alone.
+    std::span<const Number> nearParents(Number brick);
 
     /// About how many elements lie near the brick.
     std::int64_t elementsNear(Number brick);
@@ -63,9 +72,15 @@ class MeshBricks {
     const ValueMask& values(Number brick, const BrickInspector& inspector);
 
   private:
-    struct Brick {
+    struct NearParents {
+        std::array<Number, 7> numbers;
+        unsigned count = 0;
+    };
+    /// In a cache line of its own.
+    struct alignas(64) Brick {
         DepthKey key;
-        Number firstChild = 0;  ///< 0: not looked for yet
+        Number firstChild = 0;   ///< 0: not looked for yet
+        Number nearParents = 0;  ///< likewise; one more than the place in nearParents_
         ChildBits children = 0;
         std::int32_t elementsNear = -1;  ///< -1: not counted yet
         float wishedByElementSize = -1;  ///< -1: not looked for yet
@@ -75,6 +90,8 @@ class MeshBricks {
 
     void findRoots();
     void findChildren(Number brick);
+    std::optional<Number> look(const DepthKey& key);
+    Box3d boxWorld(const DepthKey& key) const;
 
     std::shared_ptr<const SharedElementIndex> shared_;
     const ElementIndex& index_;
@@ -87,6 +104,7 @@ class MeshBricks {
     RootGrid<Number> rootNumbers_;  ///< one more than the root's number; 0: no root
     std::deque<Brick> bricks_;  ///< not moved in memory as they get more: the roots, then eight places for
                                 ///< the children of each brick looked at
+    std::deque<NearParents> nearParents_;
     std::vector<std::int32_t> found_;
     std::vector<float> foundSizes_;
 };

@@ -176,21 +176,18 @@ BrickTree planByWishes(const TetMesh& mesh, const Box3d& meshBox, const RefineOp
         maxLeaves = std::min(maxLeaves, kDefaultElementSizeVoxels / brickPoints);
     WishPlanning planning(mesh, meshBox, options, maxLeaves, execution);
     planning.plan.complete(execution);
-    const GrowingTree& tree = planning.plan.tree();
+    const WishPlan& plan = planning.plan;
     const PlanFrame& frame = planning.bricks.frame();
-    if (planning.plan.isCutShort() && notes) {
+    if (plan.isCutShort() && notes) {
         std::int64_t unmet = 0;
-        for (const GrowingLeaf& leaf : tree.leaves()) {
-            const MeshBricks::Number brick = *planning.bricks.find(leaf.key);
-            unmet += isTooCoarse(planning.bricks.spacingWorld(brick), planning.plan.wishedSpacing(brick));
-        }
+        for (const MeshBricks::Number brick : plan.leaves())
+            unmet += isTooCoarse(planning.bricks.spacingWorld(brick), plan.wishedSpacing(brick));
         notes->push_back("no more than " + shortNumber(double(maxLeaves * brickPoints)) +
-                         " voxels fit: " + std::to_string(unmet) + " of " + std::to_string(tree.leafCount()) +
+                         " voxels fit: " + std::to_string(unmet) + " of " + std::to_string(plan.leafCount()) +
                          " bricks are coarser than wished for; the finest spacing is " +
-                         shortNumber(frame.spacingWorld(tree.deepest())));
+                         shortNumber(frame.spacingWorld(plan.deepest())));
     }
-    return tree.brickTree(frame.originWorld, frame.rootSpacingWorld, frame.brickCells,
-                          options.frame ? frame.maxDepth : tree.deepest());
+    return plan.brickTree(options.frame ? frame.maxDepth : plan.deepest());
 }
 
 }  // namespace

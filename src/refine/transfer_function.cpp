@@ -17,6 +17,26 @@ bool operator==(const TransferFunction& a, const TransferFunction& b) {
                       });
 }
 
+std::array<double, 4> shownAs(const TransferFunction::Stop& stop) {
+    return {stop.color[0] * stop.opacity, stop.color[1] * stop.opacity, stop.color[2] * stop.opacity,
+            stop.opacity};
+}
+
+std::array<double, 4> shownAt(const TransferFunction& function, double value) {
+    const std::vector<TransferFunction::Stop>& stops = function.stops;
+    const auto above = std::find_if(stops.begin(), stops.end(),
+                                    [&](const TransferFunction::Stop& stop) { return stop.value > value; });
+    if (above == stops.begin()) return shownAs(stops.front());
+    if (above == stops.end()) return shownAs(stops.back());
+    const TransferFunction::Stop& below = *(above - 1);
+    const double t = (value - below.value) / (above->value - below.value);
+    TransferFunction::Stop between;
+    between.opacity = below.opacity + t * (above->opacity - below.opacity);
+    for (std::size_t c = 0; c < 3; ++c)
+        between.color[c] = below.color[c] + t * (above->color[c] - below.color[c]);
+    return shownAs(between);
+}
+
 void checkTransferFunction(const TransferFunction& function) {
     if (function.stops.empty()) throw InputError("a transfer function needs a stop");
     const auto isShare = [](double v) { return v >= 0 && v <= 1; };

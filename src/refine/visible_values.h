@@ -48,10 +48,10 @@ class VisibleValues {
     struct Shown {
         float least[4], most[4];  ///< of colour times opacity, and opacity, over the bin
     };
-    bool differs(int bin, int reach) const;
+    static int leastReach(const std::array<Shown, kValueBins>& bins, int bin);
 
-    std::array<Shown, kValueBins> bins_;
-    std::array<float, kValueBins> opacity_;  ///< the largest
+    std::array<std::uint16_t, kValueBins> leastReach_;  ///< in bins, of an error that can be seen
+    std::array<float, kValueBins> opacity_;             ///< the largest
     ValueMask seen_;
 };
 

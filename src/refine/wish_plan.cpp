@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numeric>
-#include <span>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -20,6 +19,8 @@ namespace {
 constexpr double kCostElement = 450;
 constexpr double kCostPoint = 8;
 constexpr double kCostSplit = 50'000;
+// Of very small elements no more than so many are near a point.
+constexpr double kElementsAPoint = 8;
 // Bricks that hold a focus come before what lies around it.
 constexpr double kFocusGain = 64;
 
@@ -28,29 +29,38 @@ constexpr double kLeastSeen = 0.05;
 // Splits by errors until new findings are waited for.
 constexpr int kSplitsInRound = 32;
 
-struct LimitReached {};
+// A split wished for by `wished`, in a brick that holds a focus or not.
+double valueOf(double spacing, double wished, bool holdsFocus, double cost) {
+    return (holdsFocus ? kFocusGain : 1) * (1 + benefitOfSplit(spacing, wished)) / cost;
+}
 
 }  // namespace
 
 WishPlan::WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit)
-    : bricks_(bricks), wishes_(std::move(wishes)), limit_(limit), tree_(bricks.roots()) {
+    : bricks_(bricks), wishes_(std::move(wishes)), limit_(limit), leafCount_(bricks.roots().size()) {
     checkFocus(wishes_.focus);
-    const std::size_t roots = bricks.roots().size();
-    if (roots > limit.bricks)
-        throw InputError("the coarsest plan has " + std::to_string(roots) + " bricks, more than the " +
+    if (leafCount_ > limit.bricks)
+        throw InputError("the coarsest plan has " + std::to_string(leafCount_) + " bricks, more than the " +
                          std::to_string(limit.bricks) + " allowed");
-    numberOfSlot_.resize(roots);
-    std::iota(numberOfSlot_.begin(), numberOfSlot_.end(), MeshBricks::Number(0));
-    for (const MeshBricks::Number root : numberOfSlot_) consider(root);
+    states_.assign(bricks.count(), State::absent);
+    std::fill_n(states_.begin(), leafCount_, State::leaf);
+    for (MeshBricks::Number root = 0; root < leafCount_; ++root)
+        consider(root, wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(root)),
+                 holdsFocus(wishes_.focus, bricks_.boxWorld(root)));
 }
 
 double WishPlan::wishedSpacing(MeshBricks::Number brick) const {
-    return isSeen(brick) ? std::min(wishedWithoutErrors(brick), wishedByError(brick)) : kNoWish;
+    if (!isSeen(brick)) return kNoWish;
+    return std::min(wishedWithoutErrors(brick), wishedByError(brick));
 }
 
 double WishPlan::wishedWithoutErrors(MeshBricks::Number brick) const {
-    return std::min(bricks_.wishedByElementSize(brick),
-                    wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+    return wishedWithoutErrors(
+        brick, wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(brick)));
+}
+
+double WishPlan::wishedWithoutErrors(MeshBricks::Number brick, double byFocus) const {
+    return std::min(std::numbers::sqrt2 * byFocus, bricks_.wishedByElementSize(brick));
 }
 
 // Trilinear errors fall with the square of the spacing.
@@ -70,7 +80,8 @@ bool WishPlan::isSeen(MeshBricks::Number brick) const {
 double WishPlan::costOfSplit(MeshBricks::Number brick) const {
     const int cells = bricks_.frame().brickCells;
     const double points = double(cells) * cells * cells * std::popcount(bricks_.children(brick));
-    return kCostSplit + kCostPoint * points + kCostElement * double(bricks_.elementsNear(brick));
+    const double elements = std::min(double(bricks_.elementsNear(brick)), kElementsAPoint * points);
+    return kCostSplit + kCostPoint * points + kCostElement * elements;
 }
 
 double WishPlan::valueOfSplit(MeshBricks::Number brick) const {
@@ -78,8 +89,7 @@ double WishPlan::valueOfSplit(MeshBricks::Number brick) const {
     const double spacing = bricks_.spacingWorld(brick);
     const double wished = wishedWithoutErrors(brick);
     if (!isTooCoarse(spacing, wished)) return valueOfError(brick);
-    const double gain = holdsFocus(wishes_.focus, bricks_.boxWorld(brick)) ? kFocusGain : 1;
-    return gain * (1 + benefitOfSplit(spacing, wished)) / costOfSplit(brick);
+    return valueOf(spacing, wished, holdsFocus(wishes_.focus, bricks_.boxWorld(brick)), costOfSplit(brick));
 }
 
 // Less than what any other criterion gives, and more the more of the brick is seen.
@@ -96,41 +106,35 @@ double WishPlan::valueOfError(MeshBricks::Number brick) const {
     return seen * benefit / (1 + benefit) / costOfSplit(brick);
 }
 
-void WishPlan::consider(MeshBricks::Number brick) {
-    const DepthKey& key = bricks_.key(brick);
-    if (key.depth >= bricks_.frame().maxDepth || !isSeen(brick)) return;
-    const double wished = wishedWithoutErrors(brick);
-    if (isTooCoarse(bricks_.spacingWorld(brick), wished)) {
-        candidates_.push_back({valueOfSplit(brick), brick, key});
-        std::push_heap(candidates_.begin(), candidates_.end());
-    } else if (wishes_.byError) {
+void WishPlan::consider(MeshBricks::Number brick, double byFocus, bool holdsFocus) {
+    if (bricks_.key(brick).depth >= bricks_.frame().maxDepth || !isSeen(brick)) return;
+    const double spacing = bricks_.spacingWorld(brick);
+    const double wished = wishedWithoutErrors(brick, byFocus);
+    if (isTooCoarse(spacing, wished))
+        candidates_.push(valueOf(spacing, wished, holdsFocus, costOfSplit(brick)), brick);
+    else if (wishes_.byError)
         unjudged_.push_back(brick);
-    }
 }
 
 // Begins a round. False when it must wait.
 bool WishPlan::considerErrors() {
     waitsFor_.clear();
     // Balance may have split some since.
-    std::erase_if(unjudged_, [&](MeshBricks::Number brick) { return !tree_.findLeaf(bricks_.key(brick)); });
+    std::erase_if(unjudged_, [&](MeshBricks::Number brick) { return isSplit(brick); });
     for (const MeshBricks::Number brick : unjudged_)
         if (!bricks_.findings(brick)) waitsFor_.push_back(brick);
     if (!waitsFor_.empty()) return false;
-    for (const MeshBricks::Number brick : unjudged_) {
-        const double value = valueOfError(brick);
-        if (value == 0) continue;
-        byError_.push_back({value, brick, bricks_.key(brick)});
-        std::push_heap(byError_.begin(), byError_.end());
-    }
+    for (const MeshBricks::Number brick : unjudged_)
+        if (const double value = valueOfError(brick); value > 0) byError_.push(value, brick);
     unjudged_.clear();
     leftInRound_ = kSplitsInRound;
     return true;
 }
 
 // The best leaf to split; none when the plan is complete or waits.
-std::optional<WishPlan::Candidate> WishPlan::popCandidate() {
+std::optional<MeshBricks::Number> WishPlan::popCandidate() {
     while (true) {
-        std::vector<Candidate>* from = &candidates_;
+        SplitQueue* from = &candidates_;
         if (candidates_.empty()) {
             if (!wishes_.byError) return {};
             const bool isNewRound = leftInRound_ == 0 || byError_.empty();
@@ -138,69 +142,93 @@ std::optional<WishPlan::Candidate> WishPlan::popCandidate() {
             --leftInRound_;
             from = &byError_;
         }
-        std::pop_heap(from->begin(), from->end());
-        const Candidate candidate = from->back();
-        from->pop_back();
+        const MeshBricks::Number brick = *from->pop();
         // Balance may have split it before its turn.
-        if (tree_.findLeaf(candidate.key)) return candidate;
+        if (!isSplit(brick)) return brick;
     }
 }
 
+// Splits a leaf, and before it the coarser leaves that touch it.
+void WishPlan::require(MeshBricks::Number brick) {
+    for (const MeshBricks::Number near : bricks_.nearParents(brick))
+        if (stateOf(near) == State::leaf) require(near);
+    made_.push_back({brick, bricks_.children(brick)});
+    states_[brick] = State::split;
+}
+
 // False, and the plan is as it was, when the limit doesn't allow it.
-bool WishPlan::split(const DepthKey& key) {
-    const TreeChange& change = tree_.change();
-    std::vector<ChildBits> children;  // of change.removed
-    const auto choose = [&](std::span<const GrowingLeaf> wave, std::span<ChildBits> bits) {
-        std::size_t added = 0;
-        for (std::size_t i = 0; i < wave.size(); ++i) {
-            bits[i] = bricks_.children(numberOfSlot_[wave[i].slot]);
-            added += std::size_t(std::popcount(bits[i]));
-        }
-        // The bricks that were split are leaves no more, but are there.
-        const std::size_t split = splitCount_ + change.removed.size() + wave.size();
-        const std::size_t leaves = tree_.leafCount() + added - wave.size();
-        if (leaves + (limit_.counts == PlanLimit::Counts::all ? split : 0) > limit_.bricks)
-            throw LimitReached{};
-        children.insert(children.end(), bits.begin(), bits.end());
-    };
-    try {
-        tree_.split(key, choose);
-    } catch (const LimitReached&) {
+bool WishPlan::split(MeshBricks::Number brick) {
+    made_.clear();
+    given_ = 0;
+    require(brick);
+    std::size_t leaves = leafCount_ - made_.size();
+    for (const Split& split : made_) leaves += std::size_t(std::popcount(split.children));
+    // The bricks that were split are leaves no more, but are there.
+    const std::size_t above = limit_.counts == PlanLimit::Counts::all ? splitCount_ + made_.size() : 0;
+    if (leaves + above > limit_.bricks) {
+        for (const Split& split : made_) states_[split.brick] = State::leaf;
+        made_.clear();
         return false;
     }
-    splitCount_ += change.removed.size();
-    std::vector<MeshBricks::Number> added;
-    for (std::size_t i = 0; i < change.removed.size(); ++i) {
-        const MeshBricks::Number brick = numberOfSlot_[change.removed[i].slot];
-        made_.push_back({brick, children[i]});
-        for (unsigned bits = children[i]; bits != 0; bits &= bits - 1)
-            added.push_back(bricks_.child(brick, unsigned(std::countr_zero(bits))));
+    leafCount_ = leaves;
+    splitCount_ += made_.size();
+    if (states_.size() < bricks_.count()) states_.resize(bricks_.count(), State::absent);
+    for (const Split& split : made_)
+        for (unsigned bits = split.children; bits != 0; bits &= bits - 1)
+            states_[bricks_.child(split.brick, unsigned(std::countr_zero(bits)))] = State::leaf;
+    for (const Split& split : made_) {
+        const ChildWishes wishes =
+            wishesOfChildren(wishes_.focus, wishes_.finestSpacingWorld, bricks_.childBoxesWorld(split.brick));
+        for (unsigned bits = split.children; bits != 0; bits &= bits - 1) {
+            const auto c = unsigned(std::countr_zero(bits));
+            consider(bricks_.child(split.brick, c), wishes.wishedWorld[c], wishes.holdsFocus[c]);
+        }
     }
-    numberOfSlot_.resize(tree_.slotCount());
-    for (std::size_t i = 0; i < added.size(); ++i) numberOfSlot_[change.added[i].slot] = added[i];
-    for (const MeshBricks::Number brick : added) consider(brick);
-    // The coarsest last, to be given out first.
-    std::stable_sort(made_.begin(), made_.end(), [&](const Split& a, const Split& b) {
-        return bricks_.key(a.brick).depth > bricks_.key(b.brick).depth;
-    });
     return true;
 }
 
 std::optional<WishPlan::Split> WishPlan::next() {
-    while (made_.empty()) {
+    while (given_ == made_.size()) {
         if (isCutShort_) return {};
-        const std::optional<Candidate> best = popCandidate();
+        const std::optional<MeshBricks::Number> best = popCandidate();
         if (!best) return {};
-        isCutShort_ = !split(best->key);
+        isCutShort_ = !split(*best);
         if (isCutShort_) waitsFor_.clear();
     }
-    const Split split = made_.back();
-    made_.pop_back();
-    return split;
+    return made_[given_++];
 }
 
 void WishPlan::complete(const Execution& execution) {
     while (next()) execution.throwIfCancelled();
+}
+
+std::vector<MeshBricks::Number> WishPlan::leaves() const {
+    std::vector<MeshBricks::Number> leaves;
+    leaves.reserve(leafCount_);
+    for (MeshBricks::Number brick = 0; brick < states_.size(); ++brick)
+        if (states_[brick] == State::leaf) leaves.push_back(brick);
+    std::sort(leaves.begin(), leaves.end(), [&](MeshBricks::Number a, MeshBricks::Number b) {
+        return inStorageOrder(bricks_.key(a), bricks_.key(b));
+    });
+    return leaves;
+}
+
+Depth WishPlan::deepest() const {
+    Depth deepest;
+    for (MeshBricks::Number brick = 0; brick < states_.size(); ++brick)
+        if (states_[brick] == State::leaf) deepest = std::max(deepest, bricks_.key(brick).depth);
+    return deepest;
+}
+
+BrickTree WishPlan::brickTree(Depth finest) const {
+    std::vector<BrickKey> keys;
+    keys.reserve(leafCount_);
+    for (MeshBricks::Number brick = 0; brick < states_.size(); ++brick)
+        if (states_[brick] == State::leaf)
+            keys.push_back({levelOf(bricks_.key(brick).depth, finest), bricks_.key(brick).index});
+    const PlanFrame& frame = bricks_.frame();
+    return BrickTree(frame.originWorld, std::ldexp(frame.rootSpacingWorld, -finest.halvings()),
+                     frame.brickCells, std::move(keys));
 }
 
 }  // namespace tessera

@@ -7,9 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "brick/brick_tree.h"
 #include "brick/growing_tree.h"
 #include "refine/brick_findings.h"
 #include "refine/mesh_bricks.h"
+#include "refine/split_queue.h"
 #include "refine/visible_values.h"
 #include "tessera/focus.h"
 
@@ -47,7 +49,7 @@ struct PlanLimit {
 /// elements near the brick and the points of its children, with fixed weights. So the plan depends on the
 /// mesh, the wishes and the limit alone. It ends when no leaf wishes to be split, or with the first split
 /// that the limit doesn't allow. Without a limit its leaves are the coarsest balanced ones that fulfil the
-/// wishes.
+/// wishes: closed boxes that touch differ by at most one depth.
 class WishPlan {
   public:
     /// One brick of the plan and its children. The plan is balanced after each; those that balance alone asks
@@ -67,49 +69,55 @@ class WishPlan {
     /// All that is left, without errors. Throws Cancelled.
     void complete(const Execution& execution = {});
 
-    /// What next() has given so far, and perhaps a few splits more.
-    const GrowingTree& tree() const { return tree_; }
+    // What next() has given so far, and perhaps a few splits more.
+    bool isSplit(MeshBricks::Number brick) const { return stateOf(brick) == State::split; }
+    std::size_t leafCount() const { return leafCount_; }
+    /// Ascending by depth, z, y, x.
+    std::vector<MeshBricks::Number> leaves() const;
+    /// Of the finest leaf; 0 without any.
+    Depth deepest() const;
+    /// The leaves as a tree for sampling and files. Depth `finest`, the deepest or below, becomes level 0.
+    BrickTree brickTree(Depth finest) const;
+
     const Wishes& wishes() const { return wishes_; }
     /// Some leaf wishes to be split, and the limit doesn't allow it.
     bool isCutShort() const { return isCutShort_; }
-    /// The finest spacing wished for in a brick, world units; kNoWish without any. Errors count where there
-    /// are findings.
+    /// The coarsest spacing that fulfils all wishes in a brick, world units; kNoWish without any. A focus is
+    /// content with sqrt(2) times what it wishes for: bricks take the nearest of the spacings, which are
+    /// powers of two apart. Errors count where there are findings.
     double wishedSpacing(MeshBricks::Number brick) const;
     /// Benefit for cost of splitting a brick, whether it is a leaf or not; 0 where none is wished.
     double valueOfSplit(MeshBricks::Number brick) const;
 
   private:
-    struct Candidate {
-        double value = 0;
-        MeshBricks::Number brick = 0;
-        DepthKey key;
-        /// A better one comes first in a heap.
-        friend bool operator<(const Candidate& a, const Candidate& b) {
-            return a.value != b.value ? a.value < b.value : inStorageOrder(b.key, a.key);
-        }
-    };
+    enum class State : std::uint8_t { absent, leaf, split };
 
+    State stateOf(MeshBricks::Number brick) const {
+        return brick < states_.size() ? states_[brick] : State::absent;
+    }
     double wishedWithoutErrors(MeshBricks::Number brick) const;
+    double wishedWithoutErrors(MeshBricks::Number brick, double byFocus) const;
     double wishedByError(MeshBricks::Number brick) const;
     double costOfSplit(MeshBricks::Number brick) const;
     double valueOfError(MeshBricks::Number brick) const;
     bool isSeen(MeshBricks::Number brick) const;
-    void consider(MeshBricks::Number brick);
+    void consider(MeshBricks::Number brick, double byFocus, bool holdsFocus);
     bool considerErrors();
-    std::optional<Candidate> popCandidate();
-    bool split(const DepthKey& key);
+    std::optional<MeshBricks::Number> popCandidate();
+    void require(MeshBricks::Number brick);
+    bool split(MeshBricks::Number brick);
 
     MeshBricks& bricks_;
     Wishes wishes_;
     PlanLimit limit_;
-    GrowingTree tree_;
-    std::vector<MeshBricks::Number> numberOfSlot_;
-    std::vector<Candidate> candidates_;                    ///< a heap
-    std::vector<Candidate> byError_;                       ///< likewise, of leaves that have findings
+    std::vector<State> states_;  ///< by number; what lies beyond the end is absent
+    std::size_t leafCount_ = 0, splitCount_ = 0;
+    SplitQueue candidates_;
+    SplitQueue byError_;                                   ///< leaves that have findings
     std::vector<MeshBricks::Number> unjudged_, waitsFor_;  ///< leaves whose errors weren't looked at
     int leftInRound_ = 0;
-    std::vector<Split> made_;  ///< to be given out, the next one last
-    std::size_t splitCount_ = 0;
+    std::vector<Split> made_;  ///< by the last split() and given out one by one
+    std::size_t given_ = 0;
     bool isCutShort_ = false;
 };
 

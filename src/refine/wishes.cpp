@@ -57,6 +57,30 @@ bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld) {
     });
 }
 
+ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingWorld,
+                             const ChildBoxes& boxesWorld) {
+    ChildWishes wishes;
+    wishes.wishedWorld.fill(kNoWish);
+    wishes.holdsFocus.fill(false);
+    for (const Focus& one : focus) {
+        double square[3][2];  // of the distance on an axis
+        for (int half = 0; half < 2; ++half) {
+            const Box3d& box = boxesWorld.halves[half];
+            const Vec3d apart =
+                glm::max(glm::max(one.boxWorld.min - box.max, box.min - one.boxWorld.max), Vec3d(0));
+            for (int a = 0; a < 3; ++a) square[a][half] = apart[a] * apart[a];
+        }
+        for (unsigned c = 0; c < 8; ++c) {
+            if (!one.within.empty() && !reaches(one, boxesWorld.box(c))) continue;
+            const double apart = std::sqrt(square[0][c & 1] + square[1][c >> 1 & 1] + square[2][c >> 2]);
+            const double far = std::max(0.0, apart - one.roundingWorld) / one.radiusWorld;
+            wishes.wishedWorld[c] = std::min(wishes.wishedWorld[c], finestSpacingWorld * std::max(1.0, far));
+            wishes.holdsFocus[c] = wishes.holdsFocus[c] || apart == 0;
+        }
+    }
+    return wishes;
+}
+
 void checkFocus(std::span<const Focus> focus) {
     for (const Focus& one : focus) {
         if (!isFinite(one.boxWorld.min) || !isFinite(one.boxWorld.max) || one.boxWorld.empty())

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <limits>
 #include <span>
 #include <vector>
@@ -16,6 +17,28 @@ double wishedByFocus(std::span<const Focus> focus, double finestSpacingWorld, co
 
 /// Whether a place where a focus stands lies in the box.
 bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld);
+
+/// The boxes of the eight children of a brick: on each axis one of two, by the bit of childNumber().
+struct ChildBoxes {
+    Box3d halves[2];
+    Box3d box(unsigned child) const {
+        Box3d result;
+        for (int a = 0; a < 3; ++a) {
+            const Box3d& half = halves[child >> a & 1];
+            result.min[a] = half.min[a];
+            result.max[a] = half.max[a];
+        }
+        return result;
+    }
+};
+
+/// wishedByFocus() and holdsFocus() of eight children at once.
+struct ChildWishes {
+    std::array<double, 8> wishedWorld;
+    std::array<bool, 8> holdsFocus;
+};
+ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingWorld,
+                             const ChildBoxes& boxesWorld);
 
 /// Whether bricks wish to be split: whether their spacing is coarser than the one wished for, and not by
 /// rounding alone.

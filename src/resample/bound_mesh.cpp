@@ -16,8 +16,31 @@ constexpr int kPassesBeforeIndex = 6;
 constexpr double kLargestShare = 0.25;
 /// Boxes that fill more of the mesh's bounds aren't worth an index.
 constexpr double kLargestVolumeShare = 0.25;
+/// With more elements for a point some are far from all points: worth a look at each.
+constexpr double kManyAPoint = 1;
+
+// The points of the lattice as a grid, when there are many elements for a point of the box.
+std::optional<PointGrid> gridForMany(const Lattice& lattice, const IndexBox& box, std::int64_t elements) {
+    if (!lattice.isAxisParallel() || double(elements) <= kManyAPoint * double(box.count())) return {};
+    return PointGrid{
+        lattice.originWorld, {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z}, kNearMarginVoxels};
+}
 
 }  // namespace
+
+void findNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box, std::size_t most,
+              std::vector<std::int32_t>& elements) {
+    const Box3d bounds = boundsWorld(lattice, box, kNearMarginVoxels);
+    const std::optional<PointGrid> grid = gridForMany(lattice, box, index.countAbout(bounds));
+    index.query(bounds, elements, most, grid ? &*grid : nullptr);
+}
+
+std::int64_t countNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box) {
+    const Box3d bounds = boundsWorld(lattice, box, kNearMarginVoxels);
+    const std::int64_t count = index.count(bounds);
+    const std::optional<PointGrid> grid = gridForMany(lattice, box, count);
+    return grid ? index.count(bounds, &*grid) : count;
+}
 
 Box3d boundsWorld(const Lattice& lattice, const IndexBox& box, double marginVoxels) {
     Box3d bounds;
@@ -71,7 +94,7 @@ std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const I
                                  : ElementIndex::kEvery;
     std::vector<std::int32_t> elements;
     for (const IndexBox& box : boxes) {
-        index.query(boundsWorld(lattice, box, kNearMarginVoxels), elements, most);
+        findNear(index, lattice, box, most, elements);
         if (elements.size() > most) return std::nullopt;
     }
     if (boxes.size() > 1) sortEachOnce(elements);

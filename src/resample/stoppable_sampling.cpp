@@ -32,8 +32,7 @@ void StoppableSampling::cutNext(const ElementIndex& index, std::int64_t elements
         const IndexBox piece = pieces_.back();
         const Vec3i size = piece.size();
         const int longest = std::max({size.x, size.y, size.z});
-        if (longest <= 1 || (piece.count() <= kPiecePoints &&
-                             index.count(boundsWorld(lattice_, piece, kNearMarginVoxels)) <= elements))
+        if (longest <= 1 || (piece.count() <= kPiecePoints && countNear(index, lattice_, piece) <= elements))
             return;
         // Memory runs along x.
         const int axis = size.z == longest ? 2 : size.y == longest ? 1 : 0;

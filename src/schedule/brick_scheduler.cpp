@@ -107,7 +107,6 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
                 options.archive, options.threads) {
     constexpr std::size_t kMostReserved = 1 << 20;
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
-    splits_.reserve(std::min(budgetBricks(), kMostReserved) / 8);
     replan();
     beginRoots();
 }
@@ -241,7 +240,7 @@ bool BrickScheduler::fillQueue(Clock::time_point deadline) {
         if (std::any_of(changes_.begin(), changes_.end(),
                         [&](const Change& change) { return change.split == key; }))
             return true;
-        if (!tree_.isSplit(key) && !beginChange(*next_)) return true;
+        if (!isSplit(next_->brick) && !beginChange(*next_)) return true;
         next_.reset();
         if (Clock::now() >= deadline) return true;
     }
@@ -291,7 +290,7 @@ bool BrickScheduler::showSplit(const Change& change) {
     } catch (const Unbalanced&) {
         return false;
     }
-    splits_.insert(*change.split);
+    setSplit(*bricks_.find(*change.split), true);
     publish(&*change.split, tree_.change().removed, tree_.change().added);
     return true;
 }
@@ -322,21 +321,22 @@ bool BrickScheduler::makeRoom(std::size_t bricks) {
 bool BrickScheduler::mergeLeastUseful() {
     for (int attempt = 0; attempt < 2; ++attempt) {
         if (!hasRanked_) {
-            std::vector<std::pair<double, DepthKey>> ranked;
-            for (const DepthKey& key : splits_)
-                if (!plan_->tree().isSplit(key))
-                    ranked.emplace_back(plan_->valueOfSplit(*bricks_.find(key)), key);
-            std::sort(ranked.begin(), ranked.end(), [](const auto& a, const auto& b) {
-                return a.first != b.first ? a.first > b.first : inStorageOrder(a.second, b.second);
+            std::vector<std::pair<double, MeshBricks::Number>> ranked;
+            for (MeshBricks::Number brick = 0; brick < isSplit_.size(); ++brick)
+                if (isSplit_[brick] && !plan_->isSplit(brick))
+                    ranked.emplace_back(plan_->valueOfSplit(brick), brick);
+            std::sort(ranked.begin(), ranked.end(), [&](const auto& a, const auto& b) {
+                return a.first != b.first ? a.first > b.first
+                                          : inStorageOrder(bricks_.key(a.second), bricks_.key(b.second));
             });
             leastUseful_.clear();
-            for (const auto& [value, key] : ranked) leastUseful_.push_back(key);
+            for (const auto& [value, brick] : ranked) leastUseful_.push_back(brick);
             hasRanked_ = true;
             attempt = 1;  // nothing new to rank afterwards
         }
         for (std::size_t i = leastUseful_.size(); i-- > 0;) {
-            const DepthKey key = leastUseful_[i];
-            if (plan_->tree().isSplit(key) || !merge(key)) continue;
+            const MeshBricks::Number brick = leastUseful_[i];
+            if (plan_->isSplit(brick) || !merge(brick)) continue;
             leastUseful_.erase(leastUseful_.begin() + std::ptrdiff_t(i));
             return true;
         }
@@ -345,22 +345,41 @@ bool BrickScheduler::mergeLeastUseful() {
     return false;
 }
 
-bool BrickScheduler::merge(const DepthKey& key) {
+void BrickScheduler::setSplit(MeshBricks::Number brick, bool isSplit) {
+    if (brick >= isSplit_.size()) isSplit_.resize(bricks_.count());
+    isSplit_[brick] = isSplit;
+}
+
+bool BrickScheduler::merge(MeshBricks::Number brick) {
+    const DepthKey key = bricks_.key(brick);
     if (!tree_.merge(key)) return false;
-    splits_.erase(key);
+    setSplit(brick, false);
     const TreeChange change = tree_.change();
     for (const GrowingLeaf& leaf : change.removed) memory_.release(leaf.key);
     publish(&key, change.removed, change.added);
     return true;
 }
 
+ScheduleProgress BrickScheduler::progress() const {
+    return {tree_.leafCount(), plan_->leafCount(), reserved_, bytes(), budgetBytes_};
+}
+
 bool BrickScheduler::update(Clock::time_point deadline, const Execution& execution) {
     if (isAtRest_) return true;
+    const std::int64_t published = counts_.published;
+    isAtRest_ = workUntil(deadline, execution);
+    if (counts_.published > published) target_.progress(progress());
+    if (isAtRest_) target_.rest();
+    return isAtRest_;
+}
+
+// True when nothing is left to do.
+bool BrickScheduler::workUntil(Clock::time_point deadline, const Execution& execution) {
     publishFinished();
     while (true) {
         execution.throwIfCancelled();
         const bool planGoesOn = fillQueue(deadline);
-        if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return isAtRest_ = true;
+        if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return true;
         TESSERA_CHECK(!changes_.empty() || !planGoesOn || next_ || Clock::now() >= deadline || !hasRoots_ ||
                           plan_->waitsFor().empty(),
                       "a plan waits for bricks that nobody samples");

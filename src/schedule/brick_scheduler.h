@@ -9,7 +9,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <unordered_set>
 #include <vector>
 
 #include "brick/growing_tree.h"
@@ -86,6 +85,7 @@ class BrickScheduler {
     /// True at rest: what is shown is the plan. When it throws, what is shown stays consistent and the next
     /// call goes on.
     bool update(Clock::time_point deadline, const Execution& execution = {});
+    ScheduleProgress progress() const;
     /// Shows what threads of its own have done, and waits for nothing. True at rest.
     bool publish(const Execution& execution = {}) { return update(Clock::now(), execution); }
     /// Until it is at rest.
@@ -125,6 +125,7 @@ class BrickScheduler {
         int planNumber = 0;
     };
 
+    bool workUntil(Clock::time_point deadline, const Execution& execution);
     void replan();
     void beginRoots();
     bool beginChange(const WishPlan::Split& split);
@@ -135,7 +136,9 @@ class BrickScheduler {
     bool showSplit(const Change& change);
     bool makeRoom(std::size_t bricks);
     bool mergeLeastUseful();
-    bool merge(const DepthKey& key);
+    bool merge(MeshBricks::Number brick);
+    bool isSplit(MeshBricks::Number brick) const { return brick < isSplit_.size() && isSplit_[brick]; }
+    void setSplit(MeshBricks::Number brick, bool isSplit);
     void publish(const DepthKey* within, std::span<const GrowingLeaf> removed,
                  std::span<const GrowingLeaf> added);
     std::size_t budgetBricks() const { return std::size_t(budgetBytes_ / brickBytes_); }
@@ -151,14 +154,14 @@ class BrickScheduler {
     Wishes wishes_;
 
     GrowingTree tree_;
-    bool hasRoots_ = false;  ///< the coarsest bricks are shown
-    BrickMemory memory_;     ///< holds leaves and the bricks above them, and what changes wait for
-    std::unordered_set<DepthKey, DepthKeyHash> splits_;  ///< bricks above leaves
+    bool hasRoots_ = false;      ///< the coarsest bricks are shown
+    BrickMemory memory_;         ///< holds leaves and the bricks above them, and what changes wait for
+    std::vector<bool> isSplit_;  ///< by number: bricks above leaves; what lies beyond the end isn't
     std::unique_ptr<WishPlan> plan_;
     int planNumber_ = 0;
     bool isAtRest_ = false;
-    std::optional<WishPlan::Split> next_;  ///< of the plan, waiting for room
-    std::vector<DepthKey> leastUseful_;    ///< of splits_, the least useful last
+    std::optional<WishPlan::Split> next_;          ///< of the plan, waiting for room
+    std::vector<MeshBricks::Number> leastUseful_;  ///< split bricks, the least useful last
     bool hasRanked_ = false;
 
     BrickSampling sampling_;

@@ -24,12 +24,27 @@ struct Publication {
     std::span<const GrowingLeaf> bordering;
 };
 
+/// How far a scheduler is.
+struct ScheduleProgress {
+    std::size_t leavesShown = 0;
+    /// Of the plan as far as it is made: it grows while work goes on, and is shown whole at rest.
+    std::size_t leavesPlanned = 0;
+    /// Bricks that are being sampled or wait for it.
+    std::size_t bricksAtWork = 0;
+    std::int64_t bytes = 0, budgetBytes = 0;
+};
+
 /// Where a scheduler puts its bricks: a store in memory, or a pool of 3D textures.
 class BrickTarget {
   public:
     virtual ~BrickTarget() = default;
-    /// Called from within BrickScheduler's calls, by the thread that made the call. The samples may be kept.
+    // All are called from within BrickScheduler's calls, by the thread that made the call.
+    /// The samples may be kept.
     virtual void publish(const Publication& publication) = 0;
+    /// At the end of a call that published something.
+    virtual void progress(const ScheduleProgress&) {}
+    /// When it comes to rest: nothing is left to do until wishes or the budget change.
+    virtual void rest() {}
 };
 
 }  // namespace tessera

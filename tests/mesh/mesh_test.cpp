@@ -383,5 +383,39 @@ TEST(ElementIndex, FindsEveryElementWhoseBoxMeetsTheBox) {
     EXPECT_TRUE(none.empty());
 }
 
+// What is left out is far from all points; what is far and isn't left out is allowed, but must be little.
+TEST(ElementIndex, LeavesOutElementsBetweenThePointsOfAGrid) {
+    const TetMesh mesh = shakenCubes(9, 0.3, 14);
+    const ElementIndex index(mesh, {.threads = 1});
+    Random random(15);
+    std::size_t all = 0, kept = 0, needed = 0;
+    for (int i = 0; i < 60; ++i) {
+        const double spacing = 0.3 + 4 * random.unit();
+        const Vec3d origin = (i % 5 == 0 ? 1e4 : 10.0) * (random.place() - 0.5);
+        const PointGrid grid{origin, spacing * (0.8 + 0.4 * random.place()), 1.0 / 16};
+        Box3d box;
+        box.include(8.0 * random.place());
+        box.include(box.min + 8.0 * random.place());
+        std::vector<std::int32_t> plain, found;
+        index.query(box, plain);
+        index.query(box, found, ElementIndex::kEvery, &grid);
+        EXPECT_EQ(index.count(box, &grid), std::int64_t(found.size()));
+        EXPECT_TRUE(std::includes(plain.begin(), plain.end(), found.begin(), found.end()));
+        all += plain.size();
+        kept += found.size();
+        for (const std::int32_t e : plain) {
+            Box3d own;
+            for (const std::int32_t n : mesh.tets[std::size_t(e)]) own.include(mesh.points[std::size_t(n)]);
+            const Vec3d low = glm::ceil((own.min - origin) / grid.spacingWorld - grid.margin),
+                        high = glm::floor((own.max - origin) / grid.spacingWorld + grid.margin);
+            if (!(low.x <= high.x && low.y <= high.y && low.z <= high.z)) continue;
+            ++needed;
+            ASSERT_TRUE(std::binary_search(found.begin(), found.end(), e));
+        }
+    }
+    EXPECT_LT(double(kept), 0.8 * double(all));
+    EXPECT_LT(double(kept), 1.25 * double(needed));
+}
+
 }  // namespace
 }  // namespace tessera

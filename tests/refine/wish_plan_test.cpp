@@ -50,6 +50,28 @@ void expectBalanced(const BrickTree& tree) {
         }
 }
 
+TEST(SplitQueue, GivesTheLargestFirstAndOfEqualOnesTheFirst) {
+    SplitQueue queue;
+    EXPECT_FALSE(queue.pop().has_value());
+    std::mt19937 random(3);
+    std::vector<double> values;
+    for (std::uint32_t n = 0; n < 5000; ++n) {
+        values.push_back(std::exp2(std::uniform_real_distribution<double>(-70, 70)(random)));
+        queue.push(values.back(), n);
+        if (n % 3 == 0) queue.pop();
+    }
+    double last = 1e300;
+    while (const auto number = queue.pop()) {
+        // Beyond the range that is told apart all are alike.
+        const double value = std::clamp(values[*number], 0x1p-65, 0x1p63);
+        EXPECT_LE(value, last * (1 + 1.0 / 8));
+        last = value;
+    }
+    EXPECT_TRUE(queue.empty());
+    for (std::uint32_t n = 0; n < 3; ++n) queue.push(1.01 + 0.01 * n, n);
+    for (std::uint32_t n = 0; n < 3; ++n) EXPECT_EQ(*queue.pop(), n);
+}
+
 TEST(WishPlan, ByElementSizeAloneIsThePlanByElementSize) {
     for (const TetMesh& mesh : {gradedMesh(8, 2.5), ballMesh(10, 0.7)})
         for (const int resolution : {0, 150}) {
@@ -58,17 +80,13 @@ TEST(WishPlan, ByElementSizeAloneIsThePlanByElementSize) {
             const BrickTree tree = planBricks(mesh, options, {});
             WishPlanning planning(mesh, mesh.boundsWorld(), options, GrowingTree::kNoLimit, {});
             planning.plan.complete();
-            const PlanFrame& frame = planning.bricks.frame();
-            const GrowingTree& grown = planning.plan.tree();
-            EXPECT_EQ(
-                leavesOf(grown.brickTree(frame.originWorld, frame.rootSpacingWorld, 8, grown.deepest())),
-                leavesOf(tree));
+            EXPECT_EQ(leavesOf(planning.plan.brickTree(planning.plan.deepest())), leavesOf(tree));
             EXPECT_GE(tree.levelCount(), 2);
         }
 }
 
-// From the formula alone: a leaf is no coarser than wished anywhere in it, and its parent was, or else
-// balance asks for it.
+// From the formula alone: a leaf has the spacing nearest to the finest wish in it, or balance asks for a
+// finer one.
 TEST(WishPlan, AroundAFocusFollowsTheDistance) {
     const TetMesh mesh = ballMesh(8, 1);
     const RefineOptions options = optionsFor(Criterion::focus, 256);
@@ -80,7 +98,7 @@ TEST(WishPlan, AroundAFocusFollowsTheDistance) {
     std::uniform_real_distribution<double> share(0, 1);
     std::size_t needless = 0;
     const auto wished = [&](const Vec3d& p) {
-        return finest * std::max(1.0, glm::distance(p, options.focus[0].boxWorld.min) / 0.1);
+        return std::sqrt(2.0) * finest * std::max(1.0, glm::distance(p, options.focus[0].boxWorld.min) / 0.1);
     };
     const Box3d bounds = mesh.boundsWorld();
     for (const BrickKey& key : tree.leaves()) {
@@ -89,7 +107,7 @@ TEST(WishPlan, AroundAFocusFollowsTheDistance) {
         for (int i = 0; i < 50; ++i) {
             const Vec3d p = glm::mix(box.min, box.max, Vec3d(share(random), share(random), share(random)));
             if (glm::clamp(p, bounds.min, bounds.max) != p) continue;
-            EXPECT_LE(spacing, std::max(wished(p), finest) * (1 + 1e-6));
+            EXPECT_LE(spacing, wished(p) * (1 + 1e-6));
         }
         const Box3d parent = boxOf(tree, {key.level + 1, key.index >> 1});
         const Vec3d nearest = glm::clamp(options.focus[0].boxWorld.min, parent.min, parent.max);
@@ -153,9 +171,11 @@ TEST(WishPlan, GivesBalanceFirstAndStaysBalanced) {
         ++splits;
     }
     EXPECT_GT(splits, 20u);
-    const auto leaves = shown.leaves(), planned = planning.plan.tree().leaves();
+    const auto leaves = shown.leaves();
+    const auto planned = planning.plan.leaves();
     ASSERT_EQ(leaves.size(), planned.size());
-    for (std::size_t i = 0; i < leaves.size(); ++i) EXPECT_EQ(leaves[i].key, planned[i].key);
+    ASSERT_EQ(leaves.size(), planning.plan.leafCount());
+    for (std::size_t i = 0; i < leaves.size(); ++i) EXPECT_EQ(leaves[i].key, planning.bricks.key(planned[i]));
 }
 
 // The bricks are those that lists of elements give, within bounds too.
