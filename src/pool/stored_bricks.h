@@ -23,7 +23,8 @@ struct StoredBricks {
     /// One a leaf of the tree, in its order, which is GrowingLeaf::slot too; depth 0 is the coarsest level.
     /// Their samples carry values outside the mesh, for a PoolTarget without one: those of the extension, or
     /// without an extension the mean of the samples next to the point (26 neighbours, of its level). Points
-    /// on + faces that another leaf owns are left out, as they are read from that leaf.
+    /// on + faces that another leaf owns are left out, as they are read from that leaf. A vector with a
+    /// component that isn't finite has none of the others either, as readVdb() gives it.
     std::vector<ShownBrick> bricks;
     std::int64_t estimatedPoints = 0;  ///< outside the mesh, with such a mean
     std::int64_t missingPoints = 0;    ///< outside the mesh, without any value: their codes are 0
