@@ -7,6 +7,7 @@ if(TESSERA_BUILD_IO)
     target_compile_options(vdb_test PRIVATE -fno-sanitize=undefined)  # as in src/vdb
   endif()
   tessera_test(vdb_metadata_test FOLDER vdb LINK vdb)
+  tessera_test(stored_bricks_test FOLDER pool OPTIMISED LINK pool vdb software)
   tessera_test(library_test FOLDER library LINK library reference)
   tessera_test(job_test FOLDER job LINK job)
   tessera_test(cache_test FOLDER cache LINK cache software)

@@ -247,6 +247,12 @@ void addOutputOptions(CLI::App& command, ResampleArguments& a) {
                     "for levels)")
         ->group(group);
     command
+        .add_flag(
+            "--brick-statistics", a.request.write.brickStatistics,
+            "store each brick's range, histogram and error beside the samples, for programs that choose "
+            "bricks by them; for the levels layout")
+        ->group(group);
+    command
         .add_option(
             "--background", a.background,
             "value of voxels that are not stored (default: 0; in a .vti file, which has them all, a value "

@@ -231,6 +231,9 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
             "--resume goes with element-size, error and focus in --refine, not with uniform");
     r.format = &outputFormat(a);
     r.write.layout = chooseLayout(a, *r.format);
+    require(
+        !r.write.brickStatistics || r.write.layout == VdbLayout::levels,
+        "--brick-statistics: bricks are kept by the levels layout alone, which .vdb files have by default");
     r.write.background = float(a.background.value_or(0));
     if (a.background) r.write.hiddenValue = float(*a.background);
     r.write.upAxis = a.file.upAxis == "y" ? UpAxis::y : a.file.upAxis == "z" ? UpAxis::z : UpAxis::keep;
@@ -242,6 +245,7 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
     r.shape.layout = r.write.layout;
     r.shape.layers = a.file.extendLayers.value_or(r.write.layout == VdbLayout::flat ? 1 : 0);
     r.shape.halfFloat = r.write.halfFloat;
+    r.shape.leafErrors = r.write.brickStatistics;
     r.shape.boundsWorld = r.refine.boundsWorld;
     r.shape.maxFlatVoxels = r.refine.maxVoxels;
     r.format->check(r.write);

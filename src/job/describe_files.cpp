@@ -89,6 +89,7 @@ std::string vdbText(const std::string& path, const VdbFile& file, std::size_t wi
     if (file.samplesReport)
         text +=
             "  the samples before they became the file's voxels:\n" + errorText(*file.samplesReport, width);
+    if (file.statistics) text += "  range, histogram and error of each brick are stored\n";
     return text;
 }
 
@@ -117,6 +118,7 @@ void addVdb(Json& json, const VdbFile& file) {
     json["coverage"] = coverageJson(file.report);
     json["error"] = errorJson(file.report);
     if (file.samplesReport) json["samples_error"] = errorJson(*file.samplesReport);
+    if (file.statistics) json["brick_statistics"] = true;
 }
 
 Json showVdb(const std::string& path, Job& job) {

@@ -45,6 +45,12 @@ double largestValue(const Field& field) {
     return largest;
 }
 
+/// What rounding a field's values can make of its errors.
+double roundingOf(const Field& field, bool halfFloat) {
+    return (halfFloat ? kHalfRounding : kFloatRounding) * std::max(1.0, std::sqrt(double(field.components))) *
+           largestValue(field);
+}
+
 std::vector<Claim> compareReports(const TetMesh& mesh, std::span<const int> fields,
                                   const ErrorReport& claimed, const ErrorReport& measured, bool halfFloat) {
     std::vector<Claim> rows;
@@ -60,9 +66,7 @@ std::vector<Claim> compareReports(const TetMesh& mesh, std::span<const int> fiel
                                      claimed.fields.size(), measured.fields.size()));
     for (std::size_t f = 0; f < claimed.fields.size(); ++f) {
         const FieldError &a = claimed.fields[f], &b = measured.fields[f];
-        const double rounding = halfFloat ? kHalfRounding : kFloatRounding;
-        const double valueError = rounding * std::max(1.0, std::sqrt(double(b.components))) *
-                                  largestValue(mesh.fields[std::size_t(fields[f])]);
+        const double valueError = roundingOf(mesh.fields[std::size_t(fields[f])], halfFloat);
         const auto add = [&](const char* figure, double x, double y) {
             rows.push_back({a.name, figure, x, y, kRounding * std::abs(x) + valueError});
         };
@@ -72,6 +76,27 @@ std::vector<Claim> compareReports(const TetMesh& mesh, std::span<const int> fiel
         add("range", a.range, b.range);
     }
     return rows;
+}
+
+/// How many bricks are what their statistics say. @param leafErrors as measured now.
+std::vector<Claim> compareStatistics(const TetMesh& mesh, std::span<const int> fields, const VdbFile& file,
+                                     const ErrorReport& measured, const std::vector<double>& leafErrors,
+                                     const Execution& execution) {
+    const BrickStatistics& stated = *file.statistics;
+    const BrickStatistics found = measureStatistics(file.fields, file.store, execution);
+    double rounding = 0;
+    for (std::size_t f = 0; f < fields.size(); ++f)
+        if (const double range = measured.fields[f].range; range > 0)
+            rounding =
+                std::max(rounding, roundingOf(mesh.fields[std::size_t(fields[f])], file.halfFloat) / range);
+    std::int64_t sameErrors = 0;
+    for (std::size_t leaf = 0; leaf < leafErrors.size(); ++leaf) {
+        const auto error = double(stated.errors[leaf]);  // not a number: nothing is claimed
+        sameErrors += !(std::abs(error - leafErrors[leaf]) > kFloatRounding * error + rounding);
+    }
+    const auto bricks = double(stated.brickCount());
+    return {{"", "bricks with these samples", bricks, double(countSameSamples(stated, found)), 0},
+            {"", "bricks with these errors", bricks, double(sameErrors), 0}};
 }
 
 std::string claimsText(const std::vector<Claim>& claims, std::size_t width) {
@@ -231,10 +256,16 @@ Verification verifyFile(const VerifyRequest& request, Job& job) {
     MeasureOptions measure;
     measure.boundsWorld = file.boundsWorld;
     measure.outside = isFlat ? Outside::missing : Outside::nearest;
+    std::vector<double> leafErrors;
+    if (file.statistics) measure.leafErrors = &leafErrors;
     v.measured = measureError(mesh, fields, file.tree, file.store, nearest, job.execution, measure);
     // With an extension only voxels without a finite value are absent; checkVoxels tells of others.
     if (file.layers > 0) v.measured.incomplete = 0;
     v.claims = compareReports(mesh, fields, file.report, v.measured, file.halfFloat);
+    if (file.statistics)
+        for (const Claim& claim :
+             compareStatistics(mesh, fields, file, v.measured, leafErrors, job.execution))
+            v.claims.push_back(claim);
     v.voxels = check(mesh, fields, file, job.execution);
     v.strayValues = file.strayValues;
     v.gridProblems = file.gridProblems;

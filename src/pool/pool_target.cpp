@@ -28,10 +28,13 @@ bool areInOnePlane(const IndexBox& a, const IndexBox& b) {
 PoolTarget::PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields, int threads)
     : pool_(pool),
       execution_{.threads = threads},
-      nearest_(mesh, threads),
-      bricks_(mesh, fields, pool.brickCells(), nearest_) {
+      nearest_(std::in_place, mesh, threads),
+      bricks_(mesh, fields, pool.brickCells(), *nearest_) {
     TESSERA_CHECK(pool.coding().channels() == bricks_.channels(), "a pool of other channels");
 }
+
+PoolTarget::PoolTarget(BrickPool& pool, int threads)
+    : pool_(pool), execution_{.threads = threads}, bricks_(pool.coding().channels(), pool.brickCells()) {}
 
 PoolTarget::InPool& PoolTarget::inPool(std::uint32_t number) {
     if (number >= inPool_.size()) inPool_.resize(std::size_t(number) + 1);

@@ -35,6 +35,9 @@ class PoolTarget : public BrickTarget {
     /// processor.
     PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int> fields, int threads = 0);
 
+    /// For bricks whose samples have values outside the mesh too, such as those of showStored().
+    explicit PoolTarget(BrickPool& pool, int threads = 0);
+
     /// For ScheduleOptions::budgetBytes, with BrickScheduler::brickBytes(). Less keeps the pool from falling
     /// behind while frames hold states: by the slots that change during a frame.
     std::int64_t budgetBytes(std::int64_t brickBytes) const {
@@ -86,7 +89,7 @@ class PoolTarget : public BrickTarget {
 
     BrickPool& pool_;
     Execution execution_;
-    NearestOnDemand nearest_;
+    std::optional<NearestOnDemand> nearest_;
     ShownBricks bricks_;
     BrickIndex index_;  // numbers are slots
     std::vector<InPool> inPool_;

@@ -24,26 +24,35 @@ void forEachPoint(const IndexBox& box, Visit&& visit) {
             for (p.x = box.min.x; p.x < box.max.x; ++p.x) visit(p);
 }
 
+double finiteOrNone(float value) {
+    return std::isfinite(value) ? double(value) : kNone;
+}
+
+void copySample(const Block& samples, const Vec3i& p, std::span<double> values) {
+    const std::size_t offset = samples.offset(p);
+    for (std::size_t c = 0; c < values.size(); ++c) values[c] = finiteOrNone(samples.channel(int(c))[offset]);
+}
+
 }  // namespace
 
 // Nearest mesh points of places of which each is mostly near the one before: that bounds the search.
 class ShownBricks::NearestWalk {
   public:
-    explicit NearestWalk(const NearestOnDemand& nearest) : nearest_(nearest) {}
+    explicit NearestWalk(const NearestOnDemand* nearest) : nearest_(nearest) {}
 
     NearestPoint find(const Vec3d& placeWorld) {
         constexpr double kRounding = 1 + 1e-9;
         const double most = (distance_ + glm::length(placeWorld - last_)) * kRounding;
-        NearestPoint found = nearest_.get().find(placeWorld, most);
+        NearestPoint found = nearest_->get().find(placeWorld, most);
         if (found.element < 0)
-            found = nearest_.get().find(placeWorld, std::numeric_limits<double>::infinity());
+            found = nearest_->get().find(placeWorld, std::numeric_limits<double>::infinity());
         last_ = placeWorld;
         if (found.element >= 0) distance_ = found.distanceWorld;
         return found;
     }
 
   private:
-    const NearestOnDemand& nearest_;
+    const NearestOnDemand* nearest_;
     Vec3d last_{0};
     double distance_ = std::numeric_limits<double>::infinity();  // of the mesh from the last place
 };
@@ -55,10 +64,16 @@ bool operator==(const PointValues& a, const PointValues& b) {
 
 ShownBricks::ShownBricks(const TetMesh& mesh, std::span<const int> fields, int brickCells,
                          const NearestOnDemand& nearest)
-    : mesh_(mesh), nearest_(nearest), cells_(brickCells) {
-    TESSERA_CHECK(brickCells > 0 && brickCells % 2 == 0, "bricks have an even number of cells");
+    : ShownBricks(0, brickCells) {
+    mesh_ = &mesh;
+    nearest_ = &nearest;
     for (const int f : fields)
         for (int c = 0; c < mesh.fields[std::size_t(f)].components; ++c) channelOf_.emplace_back(f, c);
+    channels_ = int(channelOf_.size());
+}
+
+ShownBricks::ShownBricks(int channels, int brickCells) : channels_(channels), cells_(brickCells) {
+    TESSERA_CHECK(brickCells > 0 && brickCells % 2 == 0, "bricks have an even number of cells");
 }
 
 bool ShownBricks::isShown(const GrowingLeaf& leaf) const {
@@ -105,6 +120,7 @@ bool ShownBricks::isOnBorder(const Vec3i& local) const {
 }
 
 void ShownBricks::findOutside(Leaf& leaf) const {
+    if (!mesh_) return;
     const Block& samples = *leaf.samples;
     std::vector<double> values(channelOf_.size());
     NearestWalk walk(nearest_);
@@ -120,6 +136,10 @@ void ShownBricks::findOutside(Leaf& leaf) const {
 void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
                                 std::span<double> values) const {
     if (values.empty()) return;
+    if (!mesh_) {
+        copySample(*leaf.samples, p, values);
+        return;
+    }
     const auto offset = std::uint32_t(leaf.samples->offset(p));
     const auto known = std::lower_bound(leaf.outside.begin(), leaf.outside.end(), offset);
     if (known != leaf.outside.end() && *known == offset) {
@@ -131,8 +151,9 @@ void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& w
     const NearestPoint found = walk.find(lattice.worldFromIndex(Vec3d(p)));
     for (std::size_t c = 0; c < values.size(); ++c) {
         const auto [field, component] = channelOf_[c];
-        values[c] = found.element < 0 ? kNone : found.value(mesh_.fields[std::size_t(field)], component);
-        if (!std::isfinite(float(values[c]))) values[c] = kNone;  // as samples are
+        const double value =
+            found.element < 0 ? kNone : found.value(mesh_->fields[std::size_t(field)], component);
+        values[c] = finiteOrNone(float(value));  // as samples are
     }
 }
 
@@ -143,16 +164,11 @@ const ShownBricks::Leaf* ShownBricks::findCovering(const DepthKey& key) const {
 
 PointSource ShownBricks::ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
                                    std::span<double> values) const {
-    const Block& samples = *leaf.samples;
-    const std::size_t offset = samples.offset(p);
-    if (samples.coverage[offset] == 0) {
+    if (!leaf.samples->covered(p)) {
         nearestValues(leaf, p, walk, values);
         return PointSource::nearest;
     }
-    for (std::size_t c = 0; c < values.size(); ++c) {
-        const float value = samples.channel(int(c))[offset];
-        values[c] = std::isfinite(value) ? double(value) : kNone;
-    }
+    copySample(*leaf.samples, p, values);
     return PointSource::covered;
 }
 
@@ -220,7 +236,7 @@ PointValues ShownBricks::valuesAt(const GrowingLeaf& asked, const IndexBox& poin
     };
     NearestWalk walk(nearest_);
     PointValues result;
-    const std::size_t channels = channelOf_.size();
+    const auto channels = std::size_t(channels_);
     result.values.resize(std::size_t(points.count()) * channels);
     result.covered.resize(std::size_t(points.count()));
     std::size_t n = 0;

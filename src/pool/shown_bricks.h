@@ -22,8 +22,9 @@ struct PointValues {
 };
 
 /// The leaves that a scheduler shows, with their samples, and the seam rule over them: the values that
-/// Reconstruction gives over a tree and a store of the same leaves, bit for bit, for leaves that come and go.
-/// Reading is thread-safe while nothing is applied.
+/// Reconstruction gives over a tree and a store of the same leaves whose extension holds every point outside
+/// the mesh, bit for bit, for leaves that come and go. Values outside the mesh are floats, as in an
+/// extension. Reading is thread-safe while nothing is applied.
 class ShownBricks {
   public:
     /// @param fields indices into mesh.fields: the channels of the samples. The mesh and `nearest` must
@@ -31,10 +32,13 @@ class ShownBricks {
     ShownBricks(const TetMesh& mesh, std::span<const int> fields, int brickCells,
                 const NearestOnDemand& nearest);
 
+    /// Without a mesh: the samples have values outside it too, as those of showStored() do.
+    ShownBricks(int channels, int brickCells);
+
     /// Takes leaves away and adds others. Throws InternalError when a leaf to remove doesn't stand.
     void apply(const Publication& publication, const Execution& execution);
 
-    int channels() const { return int(channelOf_.size()); }
+    int channels() const { return channels_; }
     int brickCells() const { return cells_; }
     std::size_t leafCount() const { return leafCount_; }
     /// Whether exactly this leaf stands.
@@ -74,10 +78,11 @@ class ShownBricks {
     IndexBox pointsInside(const DepthKey& key, Depth depth) const;
     bool isOnBorder(const Vec3i& local) const;
 
-    const TetMesh& mesh_;
-    const NearestOnDemand& nearest_;
+    const TetMesh* mesh_ = nullptr;             // null: the samples have what is outside it
+    const NearestOnDemand* nearest_ = nullptr;  // as mesh_
+    int channels_;
     int cells_;
-    std::vector<std::pair<int, int>> channelOf_;  // (field, component) of each channel
+    std::vector<std::pair<int, int>> channelOf_;  // of the mesh: (field, component) of each channel
     std::vector<Leaf> leaves_;                    // by GrowingLeaf::slot
     std::size_t leafCount_ = 0;
     BrickIndex index_;  // with GrowingLeaf::slot as the number

@@ -28,6 +28,7 @@ struct BrickResult {
     BrickTree tree;
     BrickStore store;
     ErrorReport report;
+    std::vector<double> leafErrors;  ///< as MeasureOptions::leafErrors, where a file needs them; else empty
     ResampleStatistics statistics;
     std::string target;  ///< the code path that sampled it, one of Resampler::targets()
     BrickTimes times;

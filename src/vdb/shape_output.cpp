@@ -112,11 +112,14 @@ void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::v
         roundToHalf(outputs, toHalf, result.store, execution);
         isRounded = std::find(toHalf.begin(), toHalf.end(), true) != toHalf.end();
     }
-    if (!isFlat && !isRounded) return;
+    const bool isChanged = isFlat || isRounded;
+    if (!isChanged && !shape.leafErrors) return;
     MeasureOptions measure;
     measure.boundsWorld = shape.boundsWorld;
     measure.outside = isFlat ? Outside::missing : Outside::nearest;
+    if (shape.leafErrors) measure.leafErrors = &result.leafErrors;
     ErrorReport ofFile = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);
+    if (!isChanged) return;
     for (std::size_t f = 0; f < ofFile.fields.size(); ++f)
         ofFile.fields[f].name = result.report.fields[f].name;
     // With an extension only voxels without a finite value are absent, and those were skipped.

@@ -18,8 +18,9 @@ namespace tessera {
 /// What a file is to hold of some samples.
 struct OutputShape {
     VdbLayout layout = VdbLayout::levels;
-    int layers = 0;          ///< of the extension outside the mesh
-    bool halfFloat = false;  ///< round values to half floats where those can hold a grid
+    int layers = 0;           ///< of the extension outside the mesh
+    bool halfFloat = false;   ///< round values to half floats where those can hold a grid
+    bool leafErrors = false;  ///< measure each leaf's error for BrickResult::leafErrors
     std::optional<Box3d> boundsWorld;
     /// flat: bound on points; 0: 2^26, or none when the bricks have one level
     std::int64_t maxFlatVoxels = 0;

@@ -11,6 +11,7 @@
 #include "brick/seams.h"
 #include "refine/refine.h"
 #include "tessera/execution.h"
+#include "vdb/brick_statistics.h"
 
 namespace tessera {
 
@@ -41,6 +42,7 @@ struct VdbWriteOptions {
     double voxelShift = 0;
     std::optional<Box3d> boundsWorld;  ///< the box that the tree was made for, RefineOptions::boundsWorld
     int layers = 0;                    ///< of the store's extension
+    bool brickStatistics = false;      ///< levels: the file has BrickStatistics
     std::optional<float> hiddenValue;  ///< .vti: of points that nothing is stored for; see writeVti
     std::int64_t maxVoxels = 0;        ///< .vti: points that the image may have; 0: kDefaultImagePoints
     std::string algorithm, criterion, sourceFile;
@@ -67,7 +69,8 @@ struct VdbFile {
     std::vector<OutputField> fields;
     ErrorReport report;                        ///< as stated in the file: what its voxels show
     std::optional<ErrorReport> samplesReport;  ///< what the samples showed before, where that differs
-    int layers = 0;                            ///< of the extension
+    std::optional<BrickStatistics> statistics;
+    int layers = 0;  ///< of the extension
     VdbLayout layout = VdbLayout::levels;
     std::string version, sourceFile, algorithm, criterion;
     std::string target, sampleFormat, repair;  ///< as in VdbWriteOptions

@@ -118,6 +118,12 @@ BrickTree decodeTree(const std::string& text) {
     }
 }
 
+int channelCount(const std::vector<OutputField>& fields) {
+    int channels = 0;
+    for (const OutputField& field : fields) channels += field.components;
+    return channels;
+}
+
 std::string encodeBounds(const Box3d& box) {
     return Json{box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}.dump();
 }
@@ -280,6 +286,7 @@ std::map<std::string, std::string> encodeMetadata(const VdbMetadata& metadata) {
     entries["tessera_fields"] = encodeFields(metadata.fields);
     entries["tessera_report"] = reportToJson(metadata.report);
     entries["tessera_bricks"] = encodeTree(metadata.tree);
+    if (metadata.statistics) entries["tessera_brick_statistics"] = encodeStatistics(*metadata.statistics);
     return entries;
 }
 
@@ -332,6 +339,12 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
     metadata.report = reportFromJson(entry(entries, "tessera_report"));
     if (const auto report = entries.find("tessera_samples_report"); report != entries.end())
         metadata.samplesReport = reportFromJson(report->second);
+    if (const auto statistics = entries.find("tessera_brick_statistics"); statistics != entries.end()) {
+        if (metadata.layout == VdbLayout::flat) damaged("tessera_brick_statistics in a flat file");
+        const std::int64_t cells = metadata.tree.brickCells();
+        metadata.statistics = decodeStatistics(statistics->second, metadata.tree.leafCount(),
+                                               channelCount(metadata.fields), cells * cells * cells);
+    }
     return metadata;
 }
 

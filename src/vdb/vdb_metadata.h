@@ -36,7 +36,8 @@ double chooseUnitScale(double finestSpacingWorld, double requested);
 /// What the file says of itself. VdbFile without samples and grid list.
 using VdbMetadata = VdbFile;
 
-/// What a file says of some samples that are written to it. @param unitScale file units per world unit.
+/// What a file says of some samples that are written to it, but for their statistics. @param unitScale file
+/// units per world unit.
 VdbMetadata describeFile(const std::vector<OutputField>& fields, const BrickResult& result,
                          const VdbWriteOptions& options, double unitScale);
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <ostream>
 #include <tuple>
+#include <utility>
 
 #include "base/check.h"
 #include "base/floor_div.h"
@@ -487,6 +488,18 @@ void chooseUnit(const BrickTree& tree, const VdbWriteOptions& options, VdbWriteR
     checkPlace(tree, options, result);
 }
 
+// Of the samples as the file will have them; none unless they are asked for.
+std::optional<BrickStatistics> statisticsOf(const std::vector<OutputField>& fields, BrickResult& result,
+                                            const VdbWriteOptions& options, const Execution& execution) {
+    if (!options.brickStatistics) return std::nullopt;
+    TESSERA_CHECK(options.layout == VdbLayout::levels, "a flat grid's bricks aren't those of the file");
+    if (options.halfFloat) roundToHalf(fields, gridsInHalf(fields, result.store), result.store, execution);
+    BrickStatistics statistics = measureStatistics(fields, result.store, execution);
+    for (std::size_t leaf = 0; leaf < result.leafErrors.size(); ++leaf)
+        statistics.errors[leaf] = float(result.leafErrors[leaf]);
+    return statistics;
+}
+
 // The grids of a file, in its order; frees the store's tiles.
 openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm form, BrickResult& result,
                               const VdbWriteOptions& options, VdbWriteResult& written,
@@ -538,12 +551,15 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
                         const VdbWriteOptions& options, const Execution& execution) {
     VdbWriteResult written;
     AtomicFile file(path);
+    // Making the grids frees the samples.
+    std::optional<BrickStatistics> statistics = statisticsOf(fields, result, options, execution);
     const openvdb::GridPtrVec grids =
         makeGrids(fields, LeafForm::packed, result, options, written, execution);
     for (const openvdb::GridBase::Ptr& grid : grids)
         written.activeVoxels += std::int64_t(grid->activeVoxelCount());
-    writeFile(file, grids, encodeMetadata(describeFile(fields, result, options, written.unitScale)),
-              execution);
+    VdbMetadata metadata = describeFile(fields, result, options, written.unitScale);
+    metadata.statistics = std::move(statistics);
+    writeFile(file, grids, encodeMetadata(metadata), execution);
     written.fileBytes = file.size();
     file.commit(execution);
     return written;

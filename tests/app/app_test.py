@@ -4,6 +4,7 @@
 usage: app_test.py --tessera PROGRAM --data FOLDER [unittest arguments]
 """
 
+import base64
 import csv
 import fcntl
 import html.parser
@@ -757,6 +758,88 @@ class Reports(AppTest):
             self.assertTrue(report["holds"])
             self.assertGreater(report["voxels"]["covered"], 100)
             self.assertEqual(report["voxels"]["incomplete_places"], 0)
+
+    def test_brick_statistics_are_stored_and_verified(self):
+        for options in ([], ["--half", "--extend", "1"], ["--refine", "error", "--max-error", "10%", "--brick-size", "8"]):
+            self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--brick-statistics", *options)
+            self.assertIn("histogram and error of each brick", self.succeed("info", "out.vdb"))
+            info = self.report("info", "out.vdb")
+            self.assertTrue(info["brick_statistics"])
+            report = self.report("verify", self.stokes, "out.vdb")
+            self.assertTrue(report["holds"])
+            rows = {row["figure"]: row for row in report["comparison"]}
+            for figure in ("bricks with these samples", "bricks with these errors"):
+                self.assertEqual(rows[figure]["measured"], info["bricks"]["total"])
+            version, bricks, channels, errors = self.statistics("out.vdb")
+            self.assertEqual((version, bricks), (1, info["bricks"]["total"]))
+            self.assertEqual(channels, sum(error["components"] for error in info["error"].values()))
+            largest = max(error["relative_max"] for error in info["error"].values())
+            self.assertAlmostEqual(max(errors), largest, delta=1e-4 * largest if "--half" in options else 1e-6 * largest)
+        # What was written without them is as before: the voxels are the same.
+        self.succeed("resample", self.stokes, "-o", "plain.vdb", "--quiet")
+        self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--brick-statistics")
+        plain, info = (self.report("info", name) for name in ("plain.vdb", "out.vdb"))
+        self.assertNotIn("brick_statistics", plain)
+        for key in ("grids", "voxels", "error"):
+            self.assertEqual(plain[key], info[key])
+
+    @staticmethod
+    def statistics_entry(file):
+        """Where the text of tessera_brick_statistics stands in a file's bytes: behind its length, a 32-bit number."""
+        kind = b"tessera_brick_statistics" + struct.pack("<I", 6) + b"string"
+        start = file.index(kind) + len(kind) + 4
+        return start, start + struct.unpack("<I", file[start - 4 : start])[0]
+
+    def statistics(self, name):
+        """Version, bricks, channels and the bricks' errors, as docs/vdb_layout.md says."""
+        file = (self.folder / name).read_bytes()
+        start, end = self.statistics_entry(file)
+        blob = base64.b64decode(file[start:end], validate=True)
+        version, bricks, channels = struct.unpack("<3I", blob[:12])
+        place, errors = 12, []
+
+        def count():
+            nonlocal place
+            value = shift = 0
+            while True:
+                byte = blob[place]
+                place += 1
+                value |= (byte & 127) << shift
+                shift += 7
+                if byte < 128:
+                    return value
+
+        for _ in range(bricks):
+            errors.append(struct.unpack("<f", blob[place : place + 4])[0])
+            place += 4
+            for _ in range(channels):
+                bins = count()
+                place += 8 if bins else 0
+                for _ in range(bins):
+                    count(), count()
+        self.assertEqual(place, len(blob))
+        return version, bricks, channels, errors
+
+    def test_changed_brick_statistics_are_denied(self):
+        self.succeed("resample", self.stokes, "-o", "out.vdb", "--quiet", "--brick-statistics")
+        file = bytearray((self.folder / "out.vdb").read_bytes())
+        file[21:57] = b"01234567-89ab-4cde-8f01-23456789abcd"  # no digest: as a program of another kind saves it
+        start, end = self.statistics_entry(file)
+        blob = bytearray(base64.b64decode(file[start:end]))
+        last = bytes([blob[-1] - 1 if blob[-1] > 1 else 2])
+        # The first brick's error, the lowest bits of its first channel's largest value, the last bin's count.
+        for place, put, figure in ((12, struct.pack("<f", 0.5), "errors"), (21, bytes([blob[21] ^ 1]), "samples"), (len(blob) - 1, last, "samples")):
+            changed = blob[:place] + put + blob[place + len(put) :]
+            file[start:end] = base64.b64encode(changed)
+            self.write("changed.vdb", bytes(file))
+            self.reject(2, "claims", "verify", self.stokes, "changed.vdb", "--quiet")
+            report = json.loads(self.run_tessera("verify", self.stokes, "changed.vdb", "--json", "-").stdout)
+            failed = [row["figure"] for row in report["comparison"] if not row["holds"]]
+            self.assertEqual(failed, [f"bricks with these {figure}"])
+
+    def test_brick_statistics_need_levels(self):
+        for options in (["-o", "out.vdb", "--layout", "flat"], ["-o", "out.vti"], ["-o", "out.vdb", "--for", "blender"]):
+            self.reject(2, "--brick-statistics levels", "resample", self.cube, "--brick-statistics", *options)
 
     def test_verify_denies_a_file_of_another_field(self):
         self.write("other.vtu", vtu_text(fields={"f": [3 * p[0] for p in CUBE_POINTS]}))

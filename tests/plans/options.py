@@ -103,4 +103,8 @@ def draw_options(rng, mesh, algorithms):
         algorithm = others[int(draws[1] * len(others))]
     features.add(algorithm)
     use("--algorithm", algorithm, "--threads", rng.integers(1, 3))
+    # Drawn last, so that the plans of older seeds stay as they were.
+    if rng.random() < 0.4 and layout == "levels":
+        use("--brick-statistics")
+        features.add("brick statistics")
     return arguments, features

@@ -114,6 +114,34 @@ class Bench {
     std::unique_ptr<BrickScheduler> scheduler;
 };
 
+template <class Visit>
+void forEachLocal(Visit&& visit) {
+    for (int n = 0; n < 729; ++n) visit(Vec3i(n % 9, n / 9 % 9, n / 81), std::size_t(n));
+}
+
+/// Gives the store the value of the nearest mesh point wherever a leaf's closed box depends on a point
+/// outside.
+void extendEverywhere(const BrickTree& tree, const Reconstruction& reconstruction, BrickStore& store) {
+    const auto channels = std::size_t(store.channels());
+    TileMap extension;
+    std::vector<double> values(channels);
+    const auto put = [&](int level, const Vec3i& p) {
+        Tile& tile = extension[{level, floorDiv(p, kTileSize)}];
+        if (!tile.values) tile.values = std::make_unique<float[]>(channels * kTilePoints);
+        const int offset = offsetInTile(p);
+        if (tile.covered(offset)) return;
+        tile.cover(offset);
+        reconstruction.nearestValues(level, p, 0, values);
+        for (std::size_t c = 0; c < channels; ++c)
+            tile.values[c * kTilePoints + std::size_t(offset)] = float(values[c]);
+    };
+    for (const BrickKey& leaf : tree.leaves())
+        forEachLocal([&](const Vec3i& local, std::size_t) {
+            reconstruction.visitOutside(leaf.level, leaf.index * kCells + local, put);
+        });
+    store.extension() = std::move(extension);
+}
+
 /// What the seam rule gives at every point of every leaf shown, from samples made anew.
 class Expected {
   public:
@@ -128,6 +156,7 @@ class Expected {
         ResampleStatistics statistics;
         store_ = resampleTree(tree_, *bound, int(bench.fields.size()), {.threads = 2}, statistics);
         reconstruction_.emplace(bench.mesh, bench.fields, tree_, store_, nearest_);
+        extendEverywhere(tree_, *reconstruction_, store_);
     }
     bool at(const DepthKey& leaf, const Vec3i& local, std::span<double> values) const {
         const Vec3i p = leaf.index * kCells + local;
@@ -141,11 +170,6 @@ class Expected {
     BrickStore store_;
     std::optional<Reconstruction> reconstruction_;
 };
-
-template <class Visit>
-void forEachLocal(Visit&& visit) {
-    for (int n = 0; n < 729; ++n) visit(Vec3i(n % 9, n / 9 % 9, n / 81), std::size_t(n));
-}
 
 std::uint32_t expectedBits(const ValueCoding& coding, double value) {
     const auto code = float(coding.encode(value));

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "files/base64.h"
 #include "tessera/error.h"
 #include "vdb/report_json.h"
 
@@ -75,6 +78,96 @@ TEST(VdbMetadata, NumbersThatDoNotFitAreRefused) {
     expectRefused("tessera_report", "\"nodes\":80", "\"nodes\":80.5", "nodes");
     for (const char* number : {"soon", "inf", "", "0.1 s"})
         expectRefused("tessera_time", "0.1", number, "tessera_time");
+}
+
+TEST(VdbMetadata, Base64IsThatOfItsStandard) {
+    // RFC 4648, section 10.
+    const std::pair<const char*, const char*> known[] = {
+        {"", ""},        {"f", "Zg=="},        {"fo", "Zm8="},
+        {"foo", "Zm9v"}, {"foob", "Zm9vYg=="}, {"foobar", "Zm9vYmFy"}};
+    for (const auto& [bytes, text] : known) {
+        EXPECT_EQ(encodeBase64(bytes), text);
+        EXPECT_EQ(decodeBase64(text), bytes);
+    }
+    std::string all;
+    for (int i = 0; i < 256; ++i) all += char(i);
+    EXPECT_EQ(decodeBase64(encodeBase64(all)), all);
+    for (const char* text :
+         {"Zg=", "Zg", "Zh==", "Zm9=", "=Zg=", "Z===", "====", "Zg==Zg==", "Zm9v\n", "Zm-v"})
+        EXPECT_EQ(decodeBase64(text), std::nullopt) << text;
+}
+
+/// Of the three bricks and four channels of someMetadata(); the second brick has no sample.
+BrickStatistics someStatistics() {
+    BrickStatistics statistics;
+    statistics.channels = 4;
+    statistics.errors = {0.25f, NAN, 0};
+    statistics.ranges.resize(12);
+    statistics.firstBins = {0};
+    for (std::size_t i = 0; i < 12; ++i) {
+        if (i / 4 != 1) {
+            statistics.ranges[i] = {-1.5f, float(i)};
+            statistics.bins.push_back({std::uint8_t(i), 4000});
+            statistics.bins.push_back({255, 96});
+        }
+        statistics.firstBins.push_back(statistics.bins.size());
+    }
+    return statistics;
+}
+
+TEST(VdbMetadata, BrickStatisticsComeBack) {
+    EXPECT_FALSE(encodeMetadata(someMetadata()).contains("tessera_brick_statistics"));
+    EXPECT_FALSE(decodeMetadata(encodeMetadata(someMetadata())).statistics);
+    VdbMetadata metadata = someMetadata();
+    metadata.statistics = someStatistics();
+    const auto entries = encodeMetadata(metadata);
+    const VdbMetadata read = decodeMetadata(entries);
+    ASSERT_TRUE(read.statistics);
+    EXPECT_EQ(encodeMetadata(read), entries);
+    EXPECT_EQ(countSameSamples(*read.statistics, *metadata.statistics), 3);
+    EXPECT_EQ(read.statistics->errors[0], 0.25f);
+    EXPECT_TRUE(std::isnan(read.statistics->errors[1]));
+    EXPECT_TRUE(read.statistics->histogram(1, 2).empty());
+    EXPECT_EQ(read.statistics->range(2, 3).max, 11);
+    EXPECT_EQ(read.statistics->channelRange(3).max, 11);
+    EXPECT_EQ(read.statistics->histogram(2, 3)[1], (BinCount{255, 96}));
+}
+
+TEST(VdbMetadata, BrickStatisticsThatDoNotFitAreRefused) {
+    VdbMetadata metadata = someMetadata();
+    metadata.statistics = someStatistics();
+    const std::string good = *decodeBase64(encodeMetadata(metadata).at("tessera_brick_statistics"));
+    const auto refusal = [&](const std::string& text) -> std::string {
+        auto entries = encodeMetadata(metadata);
+        entries["tessera_brick_statistics"] = text;
+        try {
+            decodeMetadata(entries);
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    const auto changed = [&](std::size_t at, const std::string& bytes) {
+        return refusal(encodeBase64(std::string(good).replace(at, bytes.size(), bytes)));
+    };
+    EXPECT_EQ(refusal(encodeBase64(good)), "");
+    EXPECT_NE(refusal("no text of bytes").find("base64"), std::string::npos);
+    EXPECT_NE(changed(0, "\2").find("version 2"), std::string::npos);
+    EXPECT_NE(changed(4, "\4").find("4 bricks and 4 channels, the file has 3 and 4"), std::string::npos);
+    EXPECT_NE(changed(8, "\377\377\377\377").find("channels"), std::string::npos);
+    EXPECT_NE(changed(12, std::string("\0\0\200\277", 4)).find("negative error"), std::string::npos);
+    // The first channel: a count of bins, a range, then a gap and a count for each bin.
+    EXPECT_NE(changed(16, "\201\2").find("257 bins"), std::string::npos);
+    EXPECT_NE(changed(16, "\377\377\377\377\177").find("32 bits"), std::string::npos);
+    EXPECT_NE(changed(17, std::string("\0\0\200\177", 4)).find("range"), std::string::npos);
+    EXPECT_NE(changed(17, std::string("\0\0\200\77", 4)).find("range"), std::string::npos) << "1 above 0";
+    EXPECT_NE(changed(25, "\1").find("histogram"), std::string::npos) << "the next bin is 256";
+    EXPECT_NE(changed(26, "\241\37").find("histogram"), std::string::npos) << "4001 + 96 are above 16^3";
+    EXPECT_NE(refusal(encodeBase64(good + '\0')).find("behind the last"), std::string::npos);
+    for (std::size_t size = 0; size < good.size(); ++size)
+        EXPECT_NE(refusal(encodeBase64(good.substr(0, size))).find("ends early"), std::string::npos) << size;
+    metadata.layout = VdbLayout::flat;
+    EXPECT_NE(refusal(encodeBase64(good)).find("flat"), std::string::npos);
 }
 
 TEST(VdbMetadata, DeepNestingIsRefused) {

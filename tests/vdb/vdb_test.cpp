@@ -5,6 +5,9 @@
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
+#include <algorithm>
+#include <array>
+
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
@@ -450,6 +453,101 @@ TEST_F(VdbFileTest, HalfFloatsReadBack) {
     const VdbFile read = readVdb(file("half.vdb"));
     EXPECT_TRUE(read.halfFloat);
     expectStored(read, 10, smallIntegers, coveredAt);
+}
+
+// Values with gaps: one channel of a vector isn't finite at every seventh point.
+float withGaps(int level, const Vec3i& p, int channel) {
+    return channel == 2 && pointKey(level, p, 14) % 7 == 0 ? kNaN : smallIntegers(level, p, channel);
+}
+
+/// Range and histogram of each brick, counted point by point.
+void expectStatistics(const BrickStatistics& statistics, const BrickTree& tree) {
+    constexpr double kLow = -1000, kHigh = 1000;  // so many points that each channel has both
+    for (int channel = 0; channel < 10; ++channel) {
+        EXPECT_EQ(statistics.channelRange(channel).min, kLow);
+        EXPECT_EQ(statistics.channelRange(channel).max, kHigh);
+    }
+    for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+        const BrickKey& key = tree.leaves()[leaf];
+        for (int channel = 0; channel < 10; ++channel) {
+            std::array<std::uint32_t, 256> counts{};
+            float low = kInfinity, high = -kInfinity;
+            const Vec3i first = key.index * tree.brickCells();
+            for (int n = 0; n < 16 * 16 * 16; ++n) {
+                const Vec3i p = first + Vec3i(n & 15, n >> 4 & 15, n >> 8);
+                const bool isOut = channel >= 1 && channel <= 3 && std::isnan(withGaps(key.level, p, 2));
+                if (!coveredAt(key.level, p) || isOut) continue;
+                const float value = withGaps(key.level, p, channel);
+                low = std::min(low, value);
+                high = std::max(high, value);
+                ++counts[std::size_t(std::min(255, int((double(value) - kLow) / (kHigh - kLow) * 256)))];
+            }
+            EXPECT_EQ(statistics.range(leaf, channel).min, low);
+            EXPECT_EQ(statistics.range(leaf, channel).max, high);
+            for (const BinCount& bin : statistics.histogram(leaf, channel)) {
+                EXPECT_EQ(bin.samples, counts[bin.bin]) << int(bin.bin);
+                counts[bin.bin] = 0;
+            }
+            EXPECT_EQ(std::ranges::count(counts, 0u), 256) << "no bin is left out";
+        }
+    }
+}
+
+TEST_F(VdbFileTest, BrickStatisticsAreThoseOfTheSamples) {
+    for (UpAxis axis : {UpAxis::keep, UpAxis::y}) {
+        BrickResult result = makeResult({0, 0, 0}, 1, 16, nestedLeaves(), 10, withGaps);
+        for (std::size_t leaf = 0; leaf < result.tree.leafCount(); ++leaf)
+            result.leafErrors.push_back(0.125 * double(leaf));
+        VdbWriteOptions options;
+        options.brickStatistics = true;
+        options.upAxis = axis;
+        options.halfFloat = axis == UpAxis::y;  // holds these integers exactly
+        writeVdb(file("out.vdb"), kMixed, result, options, {});
+        const VdbFile read = readVdb(file("out.vdb"));
+        ASSERT_TRUE(read.statistics);
+        ASSERT_EQ(read.statistics->brickCount(), read.tree.leafCount());
+        expectStatistics(*read.statistics, read.tree);
+        EXPECT_EQ(read.statistics->errors[5], 0.625f);
+        const auto bricks = std::int64_t(read.tree.leafCount());
+        BrickStatistics found = measureStatistics(read.fields, read.store, {.threads = 3});
+        EXPECT_EQ(countSameSamples(*read.statistics, found), bricks);
+        ++found.bins[found.firstBins[25]].samples;
+        found.ranges[3].max = 999.5f;
+        EXPECT_EQ(countSameSamples(*read.statistics, found), bricks - 2);
+    }
+}
+
+TEST_F(VdbFileTest, BrickStatisticsAreOfRoundedValues) {
+    const auto thirds = [](int level, const Vec3i& p, int channel) {
+        return 1.0f / 3 + smallIntegers(level, p, channel);
+    };
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 10, thirds);
+    VdbWriteOptions options;
+    options.brickStatistics = true;
+    options.halfFloat = true;
+    writeVdb(file("out.vdb"), kMixed, result, options, {});
+    const VdbFile read = readVdb(file("out.vdb"));
+    EXPECT_EQ(countSameSamples(*read.statistics, measureStatistics(read.fields, read.store, {})),
+              std::int64_t(read.tree.leafCount()));
+    EXPECT_TRUE(std::isnan(read.statistics->errors[0])) << "not measured";
+}
+
+TEST_F(VdbFileTest, DamagedBrickStatisticsNameTheFile) {
+    BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
+    writeVdb(file("out.vdb"), kScalar, result, {}, {});
+    openvdb::io::File source(file("out.vdb"));
+    source.open(false);
+    const openvdb::MetaMap::Ptr metadata = source.getMetadata();
+    metadata->insertMeta("tessera_brick_statistics", openvdb::StringMetadata("AQAAAAEAAAABAAAA"));
+    openvdb::io::File(file("again.vdb")).write(*source.getGrids(), *metadata);
+    try {
+        readVdb(file("again.vdb"));
+        ADD_FAILURE() << "one brick in place of many";
+    } catch (const InputError& error) {
+        const std::string what = error.what();
+        EXPECT_NE(what.find("again.vdb"), std::string::npos) << what;
+        EXPECT_NE(what.find("is of 1 bricks"), std::string::npos) << what;
+    }
 }
 
 // A vector with a component that isn't finite is left out, and its others with it.
