@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "arguments.h"
@@ -36,7 +37,7 @@ struct Options {
     std::vector<std::string> meshPaths;
     std::vector<std::int64_t> elements{1000000};
     std::string algorithm = "software";
-    int resolution = 512, jumps = 200, threads = 2, frameMs = 8;
+    int resolution = 512, brickCells = 16, jumps = 200, threads = 2, frameMs = 8;
     double budgetMb = 2000;
     double radius = 1.0 / 16;
 };
@@ -68,6 +69,48 @@ std::string figures(const std::vector<double>& ms) {
                        quantile(ms, 1));
 }
 
+/// Plans of many leaves, without sampling: bricks of 8^3 cells and a spacing four times finer.
+void measurePlans(const TetMesh& mesh, const Box3d& bounds, RefineOptions refine,
+                  const Execution& execution) {
+    refine.brickCells = 8;
+    refine.resolution *= 4;
+    Timer timer;
+    WishPlanning planning(mesh, bounds, refine, GrowingTree::kNoLimit, execution);
+    planning.plan.complete();
+    const double firstMs = timer.elapsedMs();
+    const auto replan = [&](const Wishes& wishes) {
+        timer.restart();
+        WishPlan plan(planning.bricks, wishes, {});
+        plan.complete();
+        return std::pair(timer.elapsedMs(), plan.leafCount());
+    };
+    Wishes wishes = planning.plan.wishes();
+    std::vector<double> again, ranked;
+    for (int n = 0; n < 20; ++n) again.push_back(replan(wishes).first);
+    std::printf("  a plan of %zu leaves: %.0f ms; again, bricks looked at before: %s\n",
+                planning.plan.leafCount(), firstMs, figures(again).c_str());
+    const std::vector<int> fields{0};
+    wishes.inspector = std::make_shared<const BrickInspector>(
+        std::make_shared<const SharedElementIndex>(mesh), fields, refine, 0, execution);
+    const ValueRange range = wishes.inspector->watchedRange();
+    std::size_t most = 0;
+    for (int n = 0; n < 21; ++n) {
+        // All is seen but for a part that moves.
+        const double low = range.min + (0.1 + 0.04 * n) * range.width(), high = low + 0.05 * range.width();
+        const auto stop = [](double value, double opacity) {
+            return TransferFunction::Stop{.value = value, .color = {1, 1, 1}, .opacity = opacity};
+        };
+        const TransferFunction function{
+            .field = {},
+            .stops = {stop(range.min, 1), stop(low, 1), stop(low, 0), stop(high, 0), stop(high, 1)}};
+        wishes.visible = std::make_shared<const VisibleValues>(function, range);
+        const auto [ms, leaves] = replan(wishes);
+        most = std::max(most, leaves);
+        if (n > 0) ranked.push_back(ms);  // the first looks at the values of all elements
+    }
+    std::printf("    with another transfer function, up to %zu leaves: %s\n", most, figures(ranked).c_str());
+}
+
 void measure(const Options& options, const std::string& name, const TetMesh& mesh) {
     const std::vector<int> fields{0};
     const int channels = mesh.fields[0].components;
@@ -77,6 +120,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     ScheduleOptions schedule;
     schedule.refine.criterion = Criterion::focus;
     schedule.refine.resolution = options.resolution;
+    schedule.refine.brickCells = options.brickCells;
     schedule.refine.bind.index = std::make_shared<const SharedElementIndex>(mesh);
     schedule.refine.bind.index->get(execution);
     const double indexMs = timer.restart();
@@ -119,13 +163,16 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         std::printf("  %s: plan %.0f ms, samples %.0f ms, %.3g voxels\n",
                     criterion == Criterion::uniform ? "uniform" : "focus, offline", planMs, ms,
                     double(tree.leafCount()) * brickPoints);
-        return ms + planMs;
+        return std::pair(ms + planMs, double(tree.leafCount()) * brickPoints);
     };
-    sampleAtOnce(Criterion::focus);
-    const double uniformMs = sampleAtOnce(Criterion::uniform);
-    std::printf("  from nothing to rest over uniform: %.1f %% of the time\n", 100 * firstMs / uniformMs);
+    const double offlineMs = sampleAtOnce(Criterion::focus).first;
+    const auto [uniformMs, uniformVoxels] = sampleAtOnce(Criterion::uniform);
+    std::printf(
+        "  over uniform: %.2f %% of the voxels; from nothing to rest %.1f %% of the time, offline %.1f %%\n",
+        100 * double(leaves) * brickPoints / uniformVoxels, 100 * firstMs / uniformMs,
+        100 * offlineMs / uniformMs);
 
-    std::vector<double> better, rest, over, call, plans, replans;
+    std::vector<double> better, rest, over, call;
     const std::int64_t sampledBefore = scheduler.counts().sampled;
     for (int jump = 0; jump < options.jumps; ++jump) {
         const Vec3d place = node();
@@ -148,25 +195,15 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         rest.push_back(watch.timer.elapsedMs());
         if (canImprove && watch.isBetter) better.push_back(watch.betterMs);
     }
-    for (int n = 0; n < 3; ++n) {
-        timer.restart();
-        WishPlanning planning(mesh, bounds, schedule.refine, GrowingTree::kNoLimit, execution);
-        planning.plan.complete();
-        plans.push_back(timer.restart());
-        WishPlan again(planning.bricks, planning.plan.wishes(), {});
-        again.complete();
-        replans.push_back(timer.elapsedMs());
-    }
     const ScheduleCounts& counts = scheduler.counts();
     std::printf(
         "  %d jumps (%zu to places that weren't fine yet), %lld bricks sampled, %lld reused, %lld dropped\n",
         options.jumps, better.size(), static_cast<long long>(counts.sampled - sampledBefore),
         static_cast<long long>(counts.reused), static_cast<long long>(counts.dropped));
     std::printf(
-        "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n"
-        "    a plan from nothing: %s\n    of bricks looked at before: %s\n",
-        figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str(),
-        figures(plans).c_str(), figures(replans).c_str());
+        "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n",
+        figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str());
+    measurePlans(mesh, bounds, schedule.refine, execution);
 }
 
 }  // namespace
@@ -178,6 +215,7 @@ int main(int count, char** words) {
     arguments.add("--elements", options.elements, "sizes of the graded boxes");
     arguments.add("--algorithm", options.algorithm, "");
     arguments.add("--resolution", options.resolution, "of the finest spacing");
+    arguments.add("--brick-size", options.brickCells, "cells along a brick's edge");
     arguments.add("--radius", options.radius, "share of the longest side");
     arguments.add("--jumps", options.jumps, "");
     arguments.add("--threads", options.threads, "");

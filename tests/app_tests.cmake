@@ -39,8 +39,8 @@ endif()
 
 # What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
 # nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
-set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams measure extend oracle ray_cast
-  contract_checker contract_format contract_test hard_cases perturbed vdb image library cache)
+set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams measure extend ray_cast
+  contract_format contract_test hard_cases perturbed vdb image library cache)
 if(TESSERA_SANITIZE MATCHES thread)
   set(sanitized_areas base gl_test compare software contract_test brick_store refine schedule seams measure)
 endif()
@@ -59,10 +59,3 @@ if(TARGET tessera)
   # It sends signals in the middle of a run, so nothing else should slow that run down.
   set_tests_properties(app_test.Interruption PROPERTIES RUN_SERIAL ON)
 endif()
-
-# The longest start first, so that none is left alone at the end.
-foreach(test hard_cases_test external_check_against_vtk contract_test contract_data_test install_test random_plans app_test.Reports app_test.Reader)
-  if(TEST ${test})
-    set_tests_properties(${test} PROPERTIES COST 500)
-  endif()
-endforeach()

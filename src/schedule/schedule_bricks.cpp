@@ -82,10 +82,13 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
     if (!isBoundedEverywhere(options)) return result;
     const std::string exceeded = exceededBound(mesh, fields, options, result.report);
     result.bounded = exceeded.empty();
-    if (!result.bounded)
-        result.stoppedBecause =
-            (scheduler.isCutShort() ? "the bound on voxels" : "the finest spacing allowed") +
-            (" ended the refinement at " + exceeded);
+    if (result.bounded) return result;
+    // Errors are judged within single bricks; across borders between levels more can be measured.
+    result.stoppedBecause = scheduler.isCutShort() ? "the bound on voxels"
+                            : scheduler.tree().deepest() < scheduler.frame().maxDepth
+                                ? "single bricks within the bound"
+                                : "the finest spacing allowed";
+    result.stoppedBecause += " ended the refinement at " + exceeded;
     return result;
 }
 

@@ -1341,10 +1341,10 @@ class FocusTraces(AppTest):
                 self.assertLessEqual(len(line), 80, text)
 
     def test_small_budget_drops_bricks_and_warns_when_it_cuts_short(self):
-        rows = self.rows("--budget", "8M", "--field", "pressure")
+        rows = self.rows("--budget", "4M", "--field", "pressure")
         self.assertGreater(sum(int(row["dropped"]) for row in rows), 0)
         for row in rows:
-            self.assertLessEqual(int(row["bytes"]), 8000000)
+            self.assertLessEqual(int(row["bytes"]), 4000000)
         result = self.run_tessera(*self.command("-o", "trace.csv", "--quiet", "--budget", "2M", "--field", "pressure"))
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertRegex(result.stderr, "^tessera: warning: .*--budget")

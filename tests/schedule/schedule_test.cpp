@@ -302,6 +302,37 @@ TEST(Schedule, RefusesWhatItCannotKeep) {
     bench.expectPlan(bench.budget());
 }
 
+// Told once each time it comes to rest, and how far it is in between.
+TEST(Schedule, TellsItsTargetHowFarItIs) {
+    struct Events : BrickTarget {
+        void publish(const Publication&) override { ++published; }
+        void progress(const ScheduleProgress& progress) override { told.push_back(progress); }
+        void rest() override { ++rests; }
+        int published = 0, rests = 0;
+        std::vector<ScheduleProgress> told;
+    } events;
+    const TetMesh mesh = meshWithField(ballMesh(6, 1));
+    const std::vector<int> fields{0};
+    const SoftwareResampler resampler;
+    const ScheduleOptions options = optionsFor(Criterion::focus, 1000);
+    BrickScheduler scheduler(mesh, fields, resampler, options, events);
+    for (int round = 1; round <= 2; ++round) {
+        events.told.clear();
+        while (!scheduler.update(Clock::now(), {.threads = 1})) EXPECT_EQ(events.rests, round - 1);
+        scheduler.update(Clock::now(), {.threads = 1});
+        EXPECT_EQ(events.rests, round);
+        ASSERT_GT(events.told.size(), 1u);
+        for (const ScheduleProgress& progress : events.told) {
+            EXPECT_LE(progress.bytes, progress.budgetBytes);
+            EXPECT_EQ(progress.budgetBytes, options.budgetBytes);
+        }
+        EXPECT_EQ(scheduler.progress().leavesShown, scheduler.progress().leavesPlanned);
+        EXPECT_EQ(scheduler.progress().bricksAtWork, 0u);
+        scheduler.setFocus({pointFocus(Vec3d(-0.3), 0.05)});
+    }
+    EXPECT_LE(events.told.size(), std::size_t(events.published));
+}
+
 int asked(const char* name, int otherwise) {
     const char* text = std::getenv(name);
     return text ? std::atoi(text) : otherwise;
