@@ -44,6 +44,7 @@ WishPlan::WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit)
                          std::to_string(limit.bricks) + " allowed");
     states_.assign(bricks.count(), State::absent);
     std::fill_n(states_.begin(), leafCount_, State::leaf);
+    if (bricks.frame().maxDepth == Depth(0)) return;
     for (MeshBricks::Number root = 0; root < leafCount_; ++root)
         consider(root, wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(root)),
                  holdsFocus(wishes_.focus, bricks_.boxWorld(root)));
@@ -107,7 +108,7 @@ double WishPlan::valueOfError(MeshBricks::Number brick) const {
 }
 
 void WishPlan::consider(MeshBricks::Number brick, double byFocus, bool holdsFocus) {
-    if (bricks_.key(brick).depth >= bricks_.frame().maxDepth || !isSeen(brick)) return;
+    if (!isSeen(brick)) return;
     const double spacing = bricks_.spacingWorld(brick);
     const double wished = wishedWithoutErrors(brick, byFocus);
     if (isTooCoarse(spacing, wished))
@@ -177,6 +178,8 @@ bool WishPlan::split(MeshBricks::Number brick) {
         for (unsigned bits = split.children; bits != 0; bits &= bits - 1)
             states_[bricks_.child(split.brick, unsigned(std::countr_zero(bits)))] = State::leaf;
     for (const Split& split : made_) {
+        // The finest bricks wish for nothing.
+        if (bricks_.key(split.brick).depth + 1 >= bricks_.frame().maxDepth) continue;
         const ChildWishes wishes =
             wishesOfChildren(wishes_.focus, wishes_.finestSpacingWorld, bricks_.childBoxesWorld(split.brick));
         for (unsigned bits = split.children; bits != 0; bits &= bits - 1) {

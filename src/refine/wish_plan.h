@@ -101,6 +101,7 @@ class WishPlan {
     double costOfSplit(MeshBricks::Number brick) const;
     double valueOfError(MeshBricks::Number brick) const;
     bool isSeen(MeshBricks::Number brick) const;
+    /// Of a leaf that may be split.
     void consider(MeshBricks::Number brick, double byFocus, bool holdsFocus);
     bool considerErrors();
     std::optional<MeshBricks::Number> popCandidate();
