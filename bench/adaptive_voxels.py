@@ -5,7 +5,7 @@ combined criteria against the sum of the single ones. Prints two tables in Markd
 adaptive_voxels.py --programs build/release mesh:field[:x,y,z] ... [--bounds 5,2,1]
 
 x, y, z is the place that is refined by focus; the middle of the mesh's bounds where it isn't given. Its
-radius is a sixteenth of the longest side, its finest spacing that of 256 points along it.
+radius is a sixteenth of the longest side, its finest spacing, for all criteria, that of 1024 points along it.
 """
 
 import argparse
@@ -64,7 +64,7 @@ def print_combined(programs, meshes, bound):
         def voxels(*criteria):
             words = [word for criterion in criteria for word in options[criterion]]
             run = tessera(programs, "resample", mesh, "--field", field, "--refine", ",".join(criteria),
-                          "--resolution", "256", *words)
+                          "--resolution", "1024", *words)
             return run["voxels"]["total"]
 
         single = {criterion: voxels(criterion) for criterion in options}
