@@ -44,7 +44,8 @@ void redirect(int stream, const char* path, int flags) {
     words.push_back(nullptr);
     words[2] = const_cast<char*>("tessera");
     const int code = tesseraMain(int(words.size()) - 3, words.data() + 2);
-    // Without what libraries do at the end of a program: one waits for its threads, which stayed with the parent.
+    // Without what libraries do at the end of a program: one waits for its threads, which stayed with the
+    // parent.
     std::fflush(nullptr);
     _exit(code);
 }
