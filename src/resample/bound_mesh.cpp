@@ -16,30 +16,37 @@ constexpr int kPassesBeforeIndex = 6;
 constexpr double kLargestShare = 0.25;
 /// Boxes that fill more of the mesh's bounds aren't worth an index.
 constexpr double kLargestVolumeShare = 0.25;
-/// With more elements for a point some are far from all points: worth a look at each.
-constexpr double kManyAPoint = 1;
+/// Elements between the points of a box count for so much: they are looked at, but not sampled.
+constexpr std::int64_t kLookedAtForOne = 4;
 
-// The points of the lattice as a grid, when there are many elements for a point of the box.
-std::optional<PointGrid> gridForMany(const Lattice& lattice, const IndexBox& box, std::int64_t elements) {
-    if (!lattice.isAxisParallel() || double(elements) <= kManyAPoint * double(box.count())) return {};
-    return PointGrid{
-        lattice.originWorld, {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z}, kNearMarginVoxels};
+PointGrid gridOf(const Lattice& lattice) {
+    return {lattice.originWorld, {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z}, kNearMarginVoxels};
+}
+
+// Appends the elements that can reach points of a box, ascending. Where there are more than points, those
+// between the points are left out. Stops when there are more than `most` in the list.
+void findNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box, std::size_t most,
+              std::vector<std::int32_t>& elements) {
+    const Box3d bounds = boundsWorld(lattice, box, kNearMarginVoxels);
+    if (!lattice.isAxisParallel()) return index.query(bounds, elements, most);
+    const std::size_t before = elements.size(), many = before + std::size_t(box.count());
+    index.query(bounds, elements, many);
+    if (elements.size() <= many) return;
+    elements.resize(before);
+    const PointGrid grid = gridOf(lattice);
+    index.query(bounds, elements, most, &grid);
 }
 
 }  // namespace
 
-void findNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box, std::size_t most,
-              std::vector<std::int32_t>& elements) {
+bool areFewNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box,
+                std::int64_t elements) {
     const Box3d bounds = boundsWorld(lattice, box, kNearMarginVoxels);
-    const std::optional<PointGrid> grid = gridForMany(lattice, box, index.countAbout(bounds));
-    index.query(bounds, elements, most, grid ? &*grid : nullptr);
-}
-
-std::int64_t countNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box) {
-    const Box3d bounds = boundsWorld(lattice, box, kNearMarginVoxels);
-    const std::int64_t count = index.count(bounds);
-    const std::optional<PointGrid> grid = gridForMany(lattice, box, count);
-    return grid ? index.count(bounds, &*grid) : count;
+    const std::int64_t all = index.count(bounds);
+    if (all <= elements) return true;
+    if (all > kLookedAtForOne * elements || all <= box.count() || !lattice.isAxisParallel()) return false;
+    const PointGrid grid = gridOf(lattice);
+    return index.count(bounds, &grid) <= elements;
 }
 
 Box3d boundsWorld(const Lattice& lattice, const IndexBox& box, double marginVoxels) {

@@ -43,12 +43,10 @@ class BoundMesh {
     mutable std::atomic<int> passes_{0};  ///< for boxes that are a small part of the mesh
 };
 
-/// Appends the elements that can reach points of a box, ascending: those whose boxes meet that of the points,
-/// and of small ones mostly those that come near a point. Stops when there are more than `most` in the list.
-void findNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box, std::size_t most,
-              std::vector<std::int32_t>& elements);
-/// How many those are, or a few more.
-std::int64_t countNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box);
+/// Whether no more than so many elements can reach points of a box, and not many times as many lie between
+/// them.
+bool areFewNear(const ElementIndex& index, const Lattice& lattice, const IndexBox& box,
+                std::int64_t elements);
 
 /// Holds every place less than `marginVoxels` away from a lattice point of the box, along each lattice axis.
 Box3d boundsWorld(const Lattice& lattice, const IndexBox& box, double marginVoxels);

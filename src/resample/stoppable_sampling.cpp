@@ -13,8 +13,6 @@ namespace {
 
 /// A piece with no more points isn't cut for them.
 constexpr std::int64_t kPiecePoints = 32 * 32 * 32;
-/// Elements between its points count for so much: they are looked at, but not sampled.
-constexpr std::int64_t kLookedAtForOne = 4;
 
 }  // namespace
 
@@ -34,13 +32,8 @@ void StoppableSampling::cutNext(const ElementIndex& index, std::int64_t elements
         const IndexBox piece = pieces_.back();
         const Vec3i size = piece.size();
         const int longest = std::max({size.x, size.y, size.z});
-        const auto isSmall = [&] {
-            return piece.count() <= kPiecePoints &&
-                   index.countAbout(boundsWorld(lattice_, piece, kNearMarginVoxels)) <=
-                       kLookedAtForOne * elements &&
-                   countNear(index, lattice_, piece) <= elements;
-        };
-        if (longest <= 1 || isSmall()) return;
+        if (longest <= 1 || (piece.count() <= kPiecePoints && areFewNear(index, lattice_, piece, elements)))
+            return;
         // Memory runs along x.
         const int axis = size.z == longest ? 2 : size.y == longest ? 1 : 0;
         IndexBox low = piece, high = piece;
