@@ -203,6 +203,23 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     std::printf(
         "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n",
         figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str());
+    // On one thread all that isn't sampling is planning and bookkeeping.
+    Watch unwatched;
+    unwatched.isBetter = true;
+    timer.restart();
+    BrickScheduler single(mesh, fields, resampler, schedule, unwatched, {.threads = 1});
+    single.finish({.threads = 1});
+    const auto shareOfRest = [&](const char* what) {
+        const double samplingMs = single.samplingMs(), restMs = timer.elapsedMs() - samplingMs;
+        std::printf("  one thread, %s: sampling %.0f ms, planning and bookkeeping %.1f ms (%.1f %% of it)\n",
+                    what, samplingMs, restMs, 100 * restMs / samplingMs);
+    };
+    shareOfRest("from nothing to rest");
+    for (int jump = 0; jump < options.jumps; ++jump) {
+        single.setFocus({pointFocus(node(), radius)});
+        single.finish({.threads = 1});
+    }
+    shareOfRest("and the jumps");
     measurePlans(mesh, bounds, schedule.refine, execution);
 }
 

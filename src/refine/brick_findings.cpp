@@ -12,7 +12,8 @@ namespace tessera {
 
 namespace {
 constexpr double kNone = std::numeric_limits<double>::infinity();
-}
+constexpr double kNotFinite = std::numeric_limits<double>::quiet_NaN();
+}  // namespace
 
 BrickInspector::BrickInspector(std::shared_ptr<const SharedElementIndex> index, std::span<const int> fields,
                                const RefineOptions& options, int watched, const Execution& execution)
@@ -24,16 +25,14 @@ BrickInspector::BrickInspector(std::shared_ptr<const SharedElementIndex> index, 
     for (std::size_t f = 0; f < fields.size(); ++f) {
         const auto bound =
             std::find_if(bounds.begin(), bounds.end(), [&](const FieldBound& b) { return b.field == f; });
-        for (int c = 0; c < mesh_.fields()[f].field->components; ++c) {
-            channelOf_.emplace_back(int(f), c);
-            boundOfChannel_.push_back(bound == bounds.end() ? kNone : bound->bound);
-        }
+        boundOfField_.push_back(bound == bounds.end() ? kNone : bound->bound);
+        for (int c = 0; c < mesh_.fields()[f].field->components; ++c) channelOf_.emplace_back(int(f), c);
     }
     TESSERA_CHECK(watched >= 0 && std::size_t(watched) < channelOf_.size(), "no such channel");
     const auto [field, component] = channelOf_[std::size_t(watched)];
     range_ = finiteFloatRange(*mesh_.fields()[std::size_t(field)].field, component);
     const double width = range_.width() > 0 ? range_.width() : 1;
-    watchedBoundBins_ = boundOfChannel_[std::size_t(watched)] / width * kValueBins;
+    watchedBoundBins_ = watchedBound() / width * kValueBins;
 }
 
 ValueMask BrickInspector::binsOf(std::span<const std::int32_t> elements) const {
@@ -58,49 +57,64 @@ ValueMask BrickInspector::binsOf(std::span<const std::int32_t> elements) const {
     return mask;
 }
 
-/// The samples of one brick, and the nearest mesh values beside them.
+/// The samples of one brick, the nearest mesh values beside them, and others' on its border.
 class BrickInspector::Corners {
   public:
-    Corners(const BrickInspector& inspector, const Block& samples)
-        : inspector_(inspector), samples_(samples) {}
+    Corners(const BrickInspector& inspector, const Block& samples, const BorderValues& border)
+        : inspector_(inspector), samples_(samples), border_(border), last_(samples.box.size() - 1) {}
 
     double value(int channel, const Vec3i& local) {
         const Vec3i p = samples_.box.min + local;
         const std::size_t offset = samples_.offset(p);
-        if (samples_.coverage[offset])
+        const bool isGiven = border_ && isOnBorder(local);
+        if (!isGiven && samples_.coverage[offset])
             return double(samples_.values[std::size_t(channel) * samples_.count() + offset]);
-        if (outside_.empty()) {
+        if (others_.empty()) {
             slotOf_.assign(samples_.count(), -1);
-            outside_.reserve(64 * inspector_.channelOf_.size());
+            others_.reserve(64 * inspector_.channelOf_.size());
         }
         if (slotOf_[offset] < 0) {
-            slotOf_[offset] = int(outside_.size());
-            addNearest(p);
+            slotOf_[offset] = int(others_.size());
+            others_.resize(others_.size() + inspector_.channelOf_.size());
+            const std::span<double> values = std::span(others_).last(inspector_.channelOf_.size());
+            if (isGiven)
+                border_(p, values);
+            else
+                findNearest(p, values);
         }
-        return outside_[std::size_t(slotOf_[offset] + channel)];
+        return others_[std::size_t(slotOf_[offset] + channel)];
     }
 
   private:
-    void addNearest(const Vec3i& p) {
+    bool isOnBorder(const Vec3i& local) const {
+        return local.x == 0 || local.y == 0 || local.z == 0 || local.x == last_.x || local.y == last_.y ||
+               local.z == last_.z;
+    }
+
+    void findNearest(const Vec3i& p, std::span<double> values) {
         const Vec3d place = samples_.lattice.worldFromIndex(Vec3d(p));
         const NearestPointIndex& nearest = inspector_.nearest_.get();
         NearestPoint found = nearest.find(place, 4 * samples_.lattice.uWorld.x);
         if (found.element < 0) found = nearest.find(place, std::numeric_limits<double>::infinity());
-        for (const auto& [field, component] : inspector_.channelOf_)
-            outside_.push_back(
-                found.element < 0
-                    ? std::numeric_limits<double>::quiet_NaN()
-                    : found.value(*inspector_.mesh_.fields()[std::size_t(field)].field, component));
+        for (std::size_t c = 0; c < values.size(); ++c) {
+            const auto [field, component] = inspector_.channelOf_[c];
+            values[c] = found.element < 0
+                            ? kNotFinite
+                            : found.value(*inspector_.mesh_.fields()[std::size_t(field)].field, component);
+            if (!std::isfinite(float(values[c]))) values[c] = kNotFinite;  // as samples are
+        }
     }
 
     const BrickInspector& inspector_;
     const Block& samples_;
+    const BorderValues& border_;
+    Vec3i last_;
     std::vector<int> slotOf_;
-    std::vector<double> outside_;
+    std::vector<double> others_;
 };
 
-BrickFindings BrickInspector::inspect(const DepthKey& key, const Block& samples,
-                                      const PlanFrame& frame) const {
+BrickFindings BrickInspector::inspect(const DepthKey& key, const Block& samples, const PlanFrame& frame,
+                                      const BorderValues& border) const {
     BrickFindings findings;
     const int cells = frame.brickCells;
     const double spacing = frame.spacingWorld(key.depth);
@@ -122,33 +136,43 @@ BrickFindings BrickInspector::inspect(const DepthKey& key, const Block& samples,
         for (const std::int32_t node : mesh_.mesh().tets[std::size_t(e)]) nodes.push_back(node);
     sortEachOnce(nodes);
 
-    Corners corners(*this, samples);
+    Corners corners(*this, samples, border);
+    const auto note = [&](double exact, double value) {
+        for (const double at : {exact, value}) {
+            float& most = error[std::size_t(binOf(range_, at))];
+            most = std::max(most, float(std::abs(value - exact) / width * kValueBins));
+        }
+    };
     const auto check = [&](std::size_t sample) {
         const Vec3d local = mesh_.placeWorld(sample, frame.originWorld) / spacing - first;
         if (!(local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < cells && local.y < cells &&
               local.z < cells))
             return;
         const CellPlace place = locateInBrick(local, cells);
-        for (std::size_t c = 0; c < channelOf_.size(); ++c) {
-            const auto [f, component] = channelOf_[c];
-            const SampledField& field = mesh_.fields()[std::size_t(f)];
-            if (field.isCell() && sample < mesh_.nodeCount()) continue;
-            const bool isWatched = int(c) == watched_;
-            if (!isWatched && boundOfChannel_[c] == kNone) continue;
-            const double exact = mesh_.exactValue(sample, *field.field, component);
-            double value = 0;
-            for (int corner = 0; corner < 8; ++corner) {
-                const double weight = cornerWeight(place.fraction, corner);
-                if (weight > 0) value += weight * corners.value(int(c), place.cell + cornerOffset(corner));
+        for (std::size_t f = 0; f < boundOfField_.size(); ++f) {
+            const SampledField& field = mesh_.fields()[f];
+            const int ofField = watched_ - field.firstChannel;  // the watched component, if it is one
+            const bool isWatched = ofField >= 0 && ofField < field.field->components;
+            if ((field.isCell() && sample < mesh_.nodeCount()) || (!isWatched && boundOfField_[f] == kNone))
+                continue;
+            double squares = 0;
+            for (int k = 0; k < field.field->components; ++k) {
+                const double exact = mesh_.exactValue(sample, *field.field, k);
+                double value = 0;
+                for (int corner = 0; corner < 8; ++corner) {
+                    const double weight = cornerWeight(place.fraction, corner);
+                    if (weight > 0)
+                        value +=
+                            weight * corners.value(field.firstChannel + k, place.cell + cornerOffset(corner));
+                }
+                const double difference = value - exact;
+                squares += difference * difference;
+                if (k == ofField && std::isfinite(float(exact)) && std::isfinite(difference))
+                    note(exact, value);
             }
-            const double difference = std::abs(value - exact);
-            if (!std::isfinite(float(exact)) || !std::isfinite(difference)) continue;
-            findings.worst = std::max(findings.worst, float(difference / boundOfChannel_[c]));
-            if (!isWatched) continue;
-            for (const double at : {exact, value}) {
-                float& most = error[std::size_t(binOf(range_, at))];
-                most = std::max(most, float(difference / width * kValueBins));
-            }
+            // Values that aren't finite as floats have no samples.
+            const double ratio = std::sqrt(squares) / boundOfField_[f];
+            if (std::isfinite(ratio)) findings.worst = std::max(findings.worst, float(ratio));
         }
     };
     for (const std::int32_t node : nodes) check(std::size_t(node));

@@ -31,6 +31,8 @@ MeshBricks::MeshBricks(std::shared_ptr<const SharedElementIndex> index, const Pl
       samplesPerElement_(samplesPerElement) {
     if (samplesPerElement > 0)
         sizes_ = elementSizes(mesh_, frame.rootSpacingWorld, frame.boundsWorld, execution.withoutProgress());
+    for (Depth depth; depth <= frame.maxDepth + 1; depth = depth + 1)
+        spacings_.push_back(frame.spacingWorld(depth));
     findRoots();
 }
 
@@ -48,7 +50,7 @@ void MeshBricks::findRoots() {
                             [&](std::int32_t e) { isThere = isThere || path.holds(e); });
                 if (!isThere) continue;
                 roots_.push_back(root);
-                bricks_.emplace_back().key = key;
+                bricks_.add().key = key;
             }
     rootNumbers_ = RootGrid<Number>(roots_);
     for (std::size_t r = 0; r < roots_.size(); ++r) rootNumbers_.slot(roots_[r]) = Number(r) + 1;
@@ -109,7 +111,7 @@ void MeshBricks::findChildren(Number brick) {
     if (missing != 0) index_.walk(mayShow, show);
     const std::size_t first = bricks_.size();
     TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
-    bricks_.resize(first + 8);
+    bricks_.grow(first + 8);
     for (unsigned c = 0; c < 8; ++c) bricks_[first + c].key = children.key(c);
     bricks_[brick].firstChild = Number(first);
     bricks_[brick].children = there;
@@ -130,7 +132,7 @@ std::span<const MeshBricks::Number> MeshBricks::nearParents(Number brick) {
             if (at.index == key.index >> 1) continue;
             if (const auto number = look(at)) near.numbers[near.count++] = *number;
         }
-        nearParents_.push_back(near);
+        nearParents_.add() = near;
         bricks_[brick].nearParents = Number(nearParents_.size());
     }
     const NearParents& near = nearParents_[bricks_[brick].nearParents - 1];

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -14,6 +13,7 @@
 #include "mesh/element_index.h"
 #include "refine/brick_findings.h"
 #include "refine/brick_plan.h"
+#include "refine/steady_vector.h"
 #include "refine/visible_values.h"
 #include "refine/wishes.h"
 #include "tessera/execution.h"
@@ -47,7 +47,7 @@ class MeshBricks {
     Box3d boxWorld(Number brick) const { return boxWorld(key(brick)); }
     /// The same of all eight children, whether they are there or not.
     ChildBoxes childBoxesWorld(Number brick) const;
-    double spacingWorld(Number brick) const { return frame_.spacingWorld(key(brick).depth); }
+    double spacingWorld(Number brick) const { return spacings_[std::size_t(key(brick).depth.halvings())]; }
 
     /// Which children there are.
     ChildBits children(Number brick);
@@ -97,14 +97,14 @@ class MeshBricks {
     const ElementIndex& index_;
     const TetMesh& mesh_;
     PlanFrame frame_;
+    std::vector<double> spacings_;  ///< by depth, world units
     BrickRange rootRange_;
     double samplesPerElement_;
     std::vector<float> sizes_;  ///< in units of the root spacing
     std::vector<Vec3i> roots_;
     RootGrid<Number> rootNumbers_;  ///< one more than the root's number; 0: no root
-    std::deque<Brick> bricks_;  ///< not moved in memory as they get more: the roots, then eight places for
-                                ///< the children of each brick looked at
-    std::deque<NearParents> nearParents_;
+    SteadyVector<Brick> bricks_;    ///< the roots, then eight places for the children of each brick looked at
+    SteadyVector<NearParents> nearParents_;
     std::vector<std::int32_t> found_;
     std::vector<float> foundSizes_;
 };

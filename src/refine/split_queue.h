@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -51,11 +50,11 @@ class SplitQueue {
         std::uint32_t number, next;
     };
 
-    // Octave by octave, each in steps of a sixteenth of its lower end.
+    // Octave by octave, each in steps of a sixteenth of its lower end: the exponent and the first bits after
+    // it.
     static unsigned bucketOf(double value) {
-        int exponent = 0;
-        const double share = std::frexp(std::clamp(value, 0x1p-65, 0x1.ffp62), &exponent);  // 0.5 to 1
-        return unsigned(exponent - kLeast) * kSteps + unsigned((share - 0.5) * 2 * kSteps);
+        const double within = std::clamp(value, 0x1p-65, 0x1.ffp62);
+        return unsigned(std::bit_cast<std::uint64_t>(within) >> 48) - (1023u + kLeast - 1) * kSteps;
     }
 
     std::vector<Entry> entries_;

@@ -46,13 +46,13 @@ WishPlan::WishPlan(MeshBricks& bricks, Wishes wishes, const PlanLimit& limit)
     std::fill_n(states_.begin(), leafCount_, State::leaf);
     if (bricks.frame().maxDepth == Depth(0)) return;
     for (MeshBricks::Number root = 0; root < leafCount_; ++root)
-        consider(root, wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(root)),
+        consider(root, bricks.frame().rootSpacingWorld,
+                 wishedByFocus(wishes_.focus, wishes_.finestSpacingWorld, bricks_.boxWorld(root)),
                  holdsFocus(wishes_.focus, bricks_.boxWorld(root)));
 }
 
 double WishPlan::wishedSpacing(MeshBricks::Number brick) const {
-    if (!isSeen(brick)) return kNoWish;
-    return std::min(wishedWithoutErrors(brick), wishedByError(brick));
+    return isSeen(brick) ? std::min(wishedWithoutErrors(brick), wishedByError(brick)) : kNoWish;
 }
 
 double WishPlan::wishedWithoutErrors(MeshBricks::Number brick) const {
@@ -64,13 +64,17 @@ double WishPlan::wishedWithoutErrors(MeshBricks::Number brick, double byFocus) c
     return std::min(std::numbers::sqrt2 * byFocus, bricks_.wishedByElementSize(brick));
 }
 
+double WishPlan::errorOverBound(MeshBricks::Number brick) const {
+    const BrickFindings* findings = bricks_.findings(brick);
+    if (!findings || !isSeen(brick)) return 0;
+    return wishes_.visible
+               ? wishes_.visible->visibleError(findings->bins) / wishes_.inspector->watchedBoundBins()
+               : double(findings->worst);
+}
+
 // Trilinear errors fall with the square of the spacing.
 double WishPlan::wishedByError(MeshBricks::Number brick) const {
-    const BrickFindings* findings = wishes_.byError ? bricks_.findings(brick) : nullptr;
-    if (!findings) return kNoWish;
-    const double ratio = wishes_.visible ? wishes_.visible->visibleError(findings->bins) /
-                                               wishes_.inspector->watchedBoundBins()
-                                         : double(findings->worst);
+    const double ratio = wishes_.byError ? errorOverBound(brick) : 0;
     return ratio > 1 ? bricks_.spacingWorld(brick) / std::sqrt(ratio) : kNoWish;
 }
 
@@ -107,12 +111,12 @@ double WishPlan::valueOfError(MeshBricks::Number brick) const {
     return seen * benefit / (1 + benefit) / costOfSplit(brick);
 }
 
-void WishPlan::consider(MeshBricks::Number brick, double byFocus, bool holdsFocus) {
+// Most bricks are fine enough: nothing of theirs is read then, as reading from memory is what plans cost.
+void WishPlan::consider(MeshBricks::Number brick, double spacingWorld, double byFocus, bool holdsFocus) {
     if (!isSeen(brick)) return;
-    const double spacing = bricks_.spacingWorld(brick);
     const double wished = wishedWithoutErrors(brick, byFocus);
-    if (isTooCoarse(spacing, wished))
-        candidates_.push(valueOf(spacing, wished, holdsFocus, costOfSplit(brick)), brick);
+    if (isTooCoarse(spacingWorld, wished))
+        candidates_.push(valueOf(spacingWorld, wished, holdsFocus, costOfSplit(brick)), brick);
     else if (wishes_.byError)
         unjudged_.push_back(brick);
 }
@@ -180,11 +184,12 @@ bool WishPlan::split(MeshBricks::Number brick) {
     for (const Split& split : made_) {
         // The finest bricks wish for nothing.
         if (bricks_.key(split.brick).depth + 1 >= bricks_.frame().maxDepth) continue;
+        const double spacing = bricks_.spacingWorld(split.brick) / 2;
         const ChildWishes wishes =
             wishesOfChildren(wishes_.focus, wishes_.finestSpacingWorld, bricks_.childBoxesWorld(split.brick));
         for (unsigned bits = split.children; bits != 0; bits &= bits - 1) {
             const auto c = unsigned(std::countr_zero(bits));
-            consider(bricks_.child(split.brick, c), wishes.wishedWorld[c], wishes.holdsFocus[c]);
+            consider(bricks_.child(split.brick, c), spacing, wishes.wishedWorld[c], wishes.holdsFocus[c]);
         }
     }
     return true;

@@ -86,6 +86,9 @@ class WishPlan {
     /// content with sqrt(2) times what it wishes for: bricks take the nearest of the spacings, which are
     /// powers of two apart. Errors count where there are findings.
     double wishedSpacing(MeshBricks::Number brick) const;
+    /// The largest error found in a brick that counts, over its bound; 0 where nothing is seen, and without
+    /// findings.
+    double errorOverBound(MeshBricks::Number brick) const;
     /// Benefit for cost of splitting a brick, whether it is a leaf or not; 0 where none is wished.
     double valueOfSplit(MeshBricks::Number brick) const;
 
@@ -102,7 +105,7 @@ class WishPlan {
     double valueOfError(MeshBricks::Number brick) const;
     bool isSeen(MeshBricks::Number brick) const;
     /// Of a leaf that may be split.
-    void consider(MeshBricks::Number brick, double byFocus, bool holdsFocus);
+    void consider(MeshBricks::Number brick, double spacingWorld, double byFocus, bool holdsFocus);
     bool considerErrors();
     std::optional<MeshBricks::Number> popCandidate();
     void require(MeshBricks::Number brick);

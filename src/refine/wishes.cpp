@@ -70,12 +70,17 @@ ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingW
                 glm::max(glm::max(one.boxWorld.min - box.max, box.min - one.boxWorld.max), Vec3d(0));
             for (int a = 0; a < 3; ++a) square[a][half] = apart[a] * apart[a];
         }
+        std::array<double, 8> apart, wished;
+        for (unsigned c = 0; c < 8; ++c)
+            apart[c] = std::sqrt(square[0][c & 1] + square[1][c >> 1 & 1] + square[2][c >> 2]);
+        for (unsigned c = 0; c < 8; ++c) {
+            const double far = std::max(0.0, apart[c] - one.roundingWorld) / one.radiusWorld;
+            wished[c] = finestSpacingWorld * std::max(1.0, far);
+        }
         for (unsigned c = 0; c < 8; ++c) {
             if (!one.within.empty() && !reaches(one, boxesWorld.box(c))) continue;
-            const double apart = std::sqrt(square[0][c & 1] + square[1][c >> 1 & 1] + square[2][c >> 2]);
-            const double far = std::max(0.0, apart - one.roundingWorld) / one.radiusWorld;
-            wishes.wishedWorld[c] = std::min(wishes.wishedWorld[c], finestSpacingWorld * std::max(1.0, far));
-            wishes.holdsFocus[c] = wishes.holdsFocus[c] || apart == 0;
+            wishes.wishedWorld[c] = std::min(wishes.wishedWorld[c], wished[c]);
+            wishes.holdsFocus[c] = wishes.holdsFocus[c] || apart[c] == 0;
         }
     }
     return wishes;

@@ -29,8 +29,8 @@ namespace {
 
 // Elements of the next piece: large pieces cost less, small ones end in time.
 std::int64_t pieceElements(BrickSampling::Clock::duration left) {
-    constexpr double kElementsAMs = 700;
-    constexpr std::int64_t kMost = 4096;
+    constexpr double kElementsAMs = 400;
+    constexpr std::int64_t kMost = 65536;
     const double ms = std::chrono::duration<double, std::milli>(left).count();
     return std::clamp(std::int64_t(std::clamp(ms, 0.0, 1e6) * kElementsAMs),
                       StoppableSampling::kPieceElements / 4, kMost);
@@ -155,6 +155,11 @@ void BrickSampling::drop(const Order& order) {
     });
 }
 
+double BrickSampling::busyMs() const {
+    const std::lock_guard lock(mutex_);
+    return busyMs_;
+}
+
 // The first that no thread is at.
 BrickSampling::Taken BrickSampling::nextTask() {
     for (const std::shared_ptr<Order>& order : queue_)
@@ -167,8 +172,9 @@ BrickSampling::Taken BrickSampling::nextTask() {
     return {};
 }
 
-void BrickSampling::endPiece(const Taken& taken, bool isDone) {
+void BrickSampling::endPiece(const Taken& taken, bool isDone, Clock::time_point began) {
     --running_;
+    busyMs_ += std::chrono::duration<double, std::milli>(Clock::now() - began).count();
     Task& task = *taken.task;
     task.isRunning = false;
     task.isDone = isDone;
@@ -251,15 +257,16 @@ class BrickSampling::Crew {
     bool piece(const Taken& taken, std::unique_lock<std::mutex>& lock) {
         lock.unlock();
         bool isDone = false;
+        const auto began = Clock::now();
         try {
             isDone = sampling_.step(taken, pieceElements(deadline_ - Clock::now()), execution_);
         } catch (...) {
             lock.lock();
-            sampling_.endPiece(taken, false);
+            sampling_.endPiece(taken, false, began);
             throw;
         }
         lock.lock();
-        sampling_.endPiece(taken, isDone);
+        sampling_.endPiece(taken, isDone, began);
         return !hasEnded_ && !isLate();
     }
 
@@ -283,6 +290,7 @@ void BrickSampling::serve(const std::stop_token& stop) {
         }
         lock.unlock();
         bool isDone = false;
+        const auto began = Clock::now();
         std::exception_ptr failure;
         try {
             isDone = step(taken, 2 * StoppableSampling::kPieceElements, single);
@@ -291,7 +299,7 @@ void BrickSampling::serve(const std::stop_token& stop) {
         }
         lock.lock();
         if (failure) failure_ = failure;
-        endPiece(taken, isDone);
+        endPiece(taken, isDone, began);
     }
 }
 

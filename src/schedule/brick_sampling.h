@@ -68,6 +68,8 @@ class BrickSampling {
     void work(Clock::time_point deadline, const Execution& execution, const std::function<void()>& whenDone);
 
     ResampleStatistics statistics() const;
+    /// Of all threads, in sampling and reading.
+    double busyMs() const;
 
   private:
     struct Task;
@@ -84,7 +86,7 @@ class BrickSampling {
     Taken nextTask();
     bool hasTask() const;
     bool step(const Taken& taken, std::int64_t elements, const Execution& execution);
-    void endPiece(const Taken& taken, bool isDone);
+    void endPiece(const Taken& taken, bool isDone, Clock::time_point began);
     void serve(const std::stop_token& stop);
     void waitForThreads(Clock::time_point deadline, const Execution& execution,
                         const std::function<void()>& whenDone);
@@ -97,9 +99,10 @@ class BrickSampling {
     mutable std::mutex mutex_;  ///< of all below
     std::condition_variable_any changed_;
     std::deque<std::shared_ptr<Order>> queue_;  ///< that aren't done
-    bool anyDone_ = false;                      ///< since whenDone was called
-    int running_ = 0;                           ///< tasks
-    std::exception_ptr failure_;                ///< of a thread of its own
+    double busyMs_ = 0;
+    bool anyDone_ = false;        ///< since whenDone was called
+    int running_ = 0;             ///< tasks
+    std::exception_ptr failure_;  ///< of a thread of its own
     ResampleStatistics statistics_;
     std::vector<std::jthread> threads_;
 };

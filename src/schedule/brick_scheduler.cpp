@@ -149,6 +149,12 @@ void BrickScheduler::setTransferFunction(const std::optional<TransferFunction>& 
     replan();
 }
 
+void BrickScheduler::setFindings(std::span<LeafFindings> findings) {
+    for (LeafFindings& found : findings)
+        bricks_.setFindings(*bricks_.find(found.leaf), std::move(found.findings));
+    replan();
+}
+
 void BrickScheduler::setBudget(std::int64_t budgetBytes) {
     const std::int64_t before = std::exchange(budgetBytes_, budgetBytes);
     try {

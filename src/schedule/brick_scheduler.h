@@ -43,6 +43,11 @@ struct ScheduleOptions {
 /// Of the samples of a brick's closed box.
 std::int64_t bytesOfBrick(int channels, int brickCells);
 
+struct LeafFindings {
+    DepthKey leaf;
+    BrickFindings findings;
+};
+
 /// What a scheduler has done so far.
 struct ScheduleCounts {
     std::int64_t sampled = 0;    ///< bricks
@@ -99,6 +104,11 @@ class BrickScheduler {
     const Wishes& wishes() const { return wishes_; }
     /// What was found out about bricks so far.
     const MeshBricks& bricks() const { return bricks_; }
+    /// Findings about leaves shown that come from more than their own samples: they take the place of those
+    /// that it made, until a brick is sampled again. Plans anew.
+    void setFindings(std::span<LeafFindings> findings);
+    /// Of a leaf shown: the largest error found that counts, over its bound; 0 without errors.
+    double errorOverBound(const DepthKey& leaf) const { return plan_->errorOverBound(*bricks_.find(leaf)); }
     /// The budget holds fewer bricks than are wished for.
     bool isCutShort() const { return plan_ && plan_->isCutShort(); }
 
@@ -111,6 +121,8 @@ class BrickScheduler {
     /// The code path that samples, one of Resampler::targets().
     std::string_view resamplerTarget() const { return bound_->target(); }
     ResampleStatistics statistics() const { return sampling_.statistics(); }
+    /// What all threads spent in sampling; the rest of their work is planning and bookkeeping.
+    double samplingMs() const { return sampling_.busyMs(); }
     /// Drops all bricks that aren't shown.
     void forget();
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <random>
 #include <tuple>
 
@@ -16,6 +15,7 @@
 #include "refine/plan_frame.h"
 #include "refine/resample_tree.h"
 #include "schedule/brick_scheduler.h"
+#include "schedule/random_schedule.h"
 #include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
 #include "tessera/error.h"
@@ -35,12 +35,6 @@ TetMesh meshWithFields(TetMesh mesh) {
     int n = 0;
     addPointField(mesh, "holed", [&n](const Vec3d& p) { return ++n % 150 == 0 ? NAN : p.x + p.z; });
     return mesh;
-}
-
-// TESSERA_POOL_UPDATES asks for more.
-int updatesAsked(int otherwise) {
-    const char* text = std::getenv("TESSERA_POOL_UPDATES");
-    return text ? std::atoi(text) : otherwise;
 }
 
 enum class Algorithm { software, slicing };
@@ -345,8 +339,9 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     Bench bench(setting);
     EXPECT_EQ(bench.pool->layout().atlases > 3, setting.format == SampleFormat::r8);
     std::mt19937 random(unsigned(setting.format) + 7);
-    const int updates = updatesAsked(isSlow ? 4 : 40);
-    const int every = isSlow ? 4 : 20;
+    // TESSERA_POOL_UPDATES asks for more.
+    const int updates = asked("TESSERA_POOL_UPDATES", isSlow ? 4 : 40);
+    const int every = isSlow ? std::max(4, updates / 100) : 20;
     Seen seen;
     int acrossDepths = 0;
     for (int step = 1; step <= updates && !HasFailure(); ++step) {
@@ -383,6 +378,18 @@ INSTANTIATE_TEST_SUITE_P(All, PoolOfFormat,
                                     (std::get<1>(param.param) == Algorithm::software ? "_software"
                                                                                      : "_slicing");
                          });
+
+// TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
+TEST(SlicedSchedule, EveryPublishedStateIsWhole) {
+    TESSERA_NEEDS_GL(kPlatform);
+    const int seeds = asked("TESSERA_SCHEDULE_SEEDS", 1), steps = asked("TESSERA_SCHEDULE_STEPS", 100);
+    int cutShort = 0;
+    ScheduleCounts sum;
+    for (int seed = 0; seed < seeds && !HasFailure(); ++seed)
+        runAtRandom(unsigned(seed), steps, std::make_unique<SlicingResampler>(),
+                    {.target = std::string(nameOf(kPlatform))}, cutShort, sum);
+    EXPECT_GT(sum.sampled, 0);
+}
 
 TEST(Pool, StatesThatAreHeldStay) {
     TESSERA_NEEDS_GL(kPlatform);
