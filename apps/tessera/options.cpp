@@ -229,6 +229,10 @@ ResampleRequest resampleRequest(const ResampleArguments& typed) {
     }
     require(r.log.empty() || !r.refine.criterion.has(Criterion::uniform),
             "--resume goes with element-size, error and focus in --refine, not with uniform");
+    require(r.refine.measure == ErrorMeasure::max ||
+                (r.log.empty() && !r.refine.criterion.has(Criterion::visibility)),
+            "--error-measure rms goes neither with --resume nor with visibility: it is a figure of the whole "
+            "mesh");
     r.format = &outputFormat(a);
     r.write.layout = chooseLayout(a, *r.format);
     require(

@@ -51,7 +51,8 @@ class Bricks {
 
     /// The error of reading the bricks, against the mesh.
     const ErrorReport& report() const;
-    /// Criterion::error: the largest errors are within the bound. Else true.
+    /// Criterion::error: the largest errors, with Criterion::visibility those that are seen, are within the
+    /// bound. Else true.
     bool isWithinBound() const;
     /// What ended the refinement before the bound was reached; empty when it was.
     const std::string& stoppedBecause() const;

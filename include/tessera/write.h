@@ -50,7 +50,7 @@ struct OutputFile {
     std::int64_t activeVoxels = 0;
     /// Of what the file's voxels show: they can be coarser or less precise than the samples.
     ErrorReport report;
-    /// Criterion::error: that is within the bound. Else true.
+    /// Criterion::error: that is within the bound; with Criterion::visibility, the samples are. Else true.
     bool isWithinBound = true;
     /// What a user should know, a sentence each: a unit chosen, a grid coarser than the bricks.
     std::vector<std::string> notes;

@@ -92,7 +92,7 @@ const ErrorReport& Bricks::report() const {
 }
 
 bool Bricks::isWithinBound() const {
-    return !isBoundedEverywhere(parts_->refine) || parts_->result.bounded;
+    return !parts_->refine.criterion.has(Criterion::error) || parts_->result.bounded;
 }
 
 const std::string& Bricks::stoppedBecause() const {

@@ -90,8 +90,8 @@ VdbWriteOptions writeOptions(const Bricks::Parts& parts, const OutputOptions& op
 
 /// The bound is judged by what the file shows.
 bool isFileWithinBound(const Bricks::Parts& parts, std::vector<std::string>& notes) {
-    const bool isByError = isBoundedEverywhere(parts.refine);
-    if (!isByError || !parts.result.bounded) return !isByError;
+    if (!parts.refine.criterion.has(Criterion::error)) return true;
+    if (!parts.result.bounded || !isBoundedEverywhere(parts.refine)) return parts.result.bounded;
     std::string exceeded = exceededBound(*parts.mesh, parts.chosen.fields, parts.refine, parts.result.report);
     if (exceeded.empty() && parts.result.report.incomplete > 0)
         exceeded = std::to_string(parts.result.report.incomplete) +

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "base/check.h"
+#include "mesh/geometry.h"
 #include "refine/error_bounds.h"
 
 namespace tessera {
@@ -13,6 +15,14 @@ namespace tessera {
 namespace {
 constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr double kNotFinite = std::numeric_limits<double>::quiet_NaN();
+
+bool isFlat(const TetMesh& mesh, std::int32_t element) {
+    const auto& tet = mesh.tets[std::size_t(element)];
+    const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
+                &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
+    const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
+    return std::abs(sixfold.value) <= sixfold.errorBound && exactVolumeSign(a, b, c, d) == 0;
+}
 }  // namespace
 
 BrickInspector::BrickInspector(std::shared_ptr<const SharedElementIndex> index, std::span<const int> fields,
@@ -132,11 +142,17 @@ BrickFindings BrickInspector::inspect(const DepthKey& key, const Block& samples,
     const Vec3d low = frame.originWorld + first * spacing;
     std::vector<std::int32_t> elements, nodes;
     index_->get().query({low, low + spacing * cells}, elements);
+    // As in ErrorSamples: flat elements have no sample, and neither have nodes that only those use.
+    std::erase_if(elements, [&](std::int32_t e) { return isFlat(mesh_.mesh(), e); });
     for (const std::int32_t e : elements)
         for (const std::int32_t node : mesh_.mesh().tets[std::size_t(e)]) nodes.push_back(node);
     sortEachOnce(nodes);
 
     Corners corners(*this, samples, border);
+    std::optional<Box3d> within;  // from the origin
+    if (frame.boundsWorld)
+        within =
+            Box3d{frame.boundsWorld->min - frame.originWorld, frame.boundsWorld->max - frame.originWorld};
     const auto note = [&](double exact, double value) {
         for (const double at : {exact, value}) {
             float& most = error[std::size_t(binOf(range_, at))];
@@ -144,10 +160,12 @@ BrickFindings BrickInspector::inspect(const DepthKey& key, const Block& samples,
         }
     };
     const auto check = [&](std::size_t sample) {
-        const Vec3d local = mesh_.placeWorld(sample, frame.originWorld) / spacing - first;
+        const Vec3d placeWorld = mesh_.placeWorld(sample, frame.originWorld);
+        const Vec3d local = placeWorld / spacing - first;
         if (!(local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < cells && local.y < cells &&
               local.z < cells))
             return;
+        if (within && !contains(*within, placeWorld)) return;
         const CellPlace place = locateInBrick(local, cells);
         for (std::size_t f = 0; f < boundOfField_.size(); ++f) {
             const SampledField& field = mesh_.fields()[f];

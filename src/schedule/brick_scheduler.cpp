@@ -70,6 +70,11 @@ Wishes firstWishes(const TetMesh& mesh, std::span<const int> fields, const Sched
     const std::string name = options.transferFunction ? options.transferFunction->field : "";
     wishes.inspector = std::make_shared<const BrickInspector>(std::move(index), fields, refine,
                                                               channelOf(mesh, fields, name), execution);
+    if (wishes.byError && options.transferFunction && wishes.inspector->watchedRange().width() > 0 &&
+        std::isinf(wishes.inspector->watchedBound()))
+        throw InputError("the error bound doesn't hold for " +
+                         (name.empty() ? "the field" : "field " + name) +
+                         " that the transfer function is for");
     if (options.transferFunction)
         wishes.visible = std::make_shared<const VisibleValues>(*options.transferFunction,
                                                                wishes.inspector->watchedRange());

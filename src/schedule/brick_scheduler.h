@@ -64,8 +64,8 @@ struct ScheduleCounts {
 ///
 /// Its work is done in update(), by as many threads as that is given, or by threads of its own; what they
 /// have done is shown in update() or publish(). All calls are for one thread.
-/// What it shows at rest depends on the mesh, the wishes and the budget alone: it is the plan that WishPlan
-/// makes.
+/// What it shows at rest depends on the mesh, the wishes and the budget alone, unless findings are set: it is
+/// the plan that WishPlan makes.
 class BrickScheduler {
   public:
     using Clock = std::chrono::steady_clock;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -9,9 +10,11 @@
 #include "base/text.h"
 #include "base/timer.h"
 #include "brick/kept_points.h"
+#include "brick/leaf_tiles.h"
 #include "refine/measure_error.h"
 #include "refine/plan_frame.h"
 #include "refine/refine.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -23,42 +26,66 @@ class Unseen : public BrickTarget {
     void publish(const Publication&) override {}
 };
 
-bool bordersOnCoarser(const BrickTree& tree, const BrickKey& key) {
-    for (int n = 0; n < 27; ++n) {
-        const BrickKey near{key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)};
-        const std::int64_t leaf = tree.findCovering(near);
-        if (leaf >= 0 && tree.leaves()[std::size_t(leaf)].level > key.level) return true;
-    }
-    return false;
-}
+/// While a scheduler works, errors are judged within single bricks. This judges leaves that border on coarser
+/// ones as they are shown: on the border the coarser brick's samples decide.
+class BorderJudge {
+  public:
+    BorderJudge(const TetMesh& mesh, std::span<const int> fields, const BrickScheduler& scheduler)
+        : mesh_(mesh), fields_(fields), scheduler_(scheduler) {}
 
-// While a scheduler works, errors are judged within single bricks. These are of leaves that border on coarser
-// ones, where the coarser brick's samples decide.
-std::vector<LeafFindings> findAcrossBorders(const BrickScheduler& scheduler, const BricksShown& shown,
-                                            Depth finest, const Reconstruction& reconstruction,
-                                            const Execution& execution) {
-    std::vector<LeafFindings> findings;
-    for (const BrickKey& key : shown.tree.leaves())
-        if (bordersOnCoarser(shown.tree, key)) findings.push_back({{finest - key.level, key.index}, {}});
-    parallelFor(execution.withoutProgress(), std::int64_t(findings.size()), [&](std::int64_t i) {
-        auto& [leaf, found] = findings[std::size_t(i)];
-        const int level = levelOf(leaf.depth, finest);
-        found = scheduler.wishes().inspector->inspect(
-            leaf, *scheduler.samples(leaf), scheduler.frame(),
-            [&](const Vec3i& p, std::span<double> values) { reconstruction.resolve(level, p, 0, values); });
-    });
-    return findings;
-}
+    std::vector<LeafFindings> judge(const BricksShown& shown, Depth finest, const NearestOnDemand& nearest,
+                                    const Execution& execution) {
+        const BrickTree& tree = shown.tree;
+        const Reconstruction reconstruction(mesh_, fields_, tree, shown.store, nearest);
+        std::vector<LeafFindings> findings;
+        std::vector<bool> bordersOnCoarser;
+        for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
+            const BrickKey& key = tree.leaves()[leaf];
+            const DepthKey depthKey{finest - key.level, key.index};
+            const bool borders = hasCoarserNeighbour(tree, leaf);
+            // What was found across a border that is no more is found anew.
+            if (!borders && !judged_.contains(depthKey)) continue;
+            findings.push_back({depthKey, {}});
+            bordersOnCoarser.push_back(borders);
+            judged_.insert(depthKey);
+        }
+        parallelFor(execution.withoutProgress(), std::int64_t(findings.size()), [&](std::int64_t i) {
+            auto& [leaf, found] = findings[std::size_t(i)];
+            const int level = levelOf(leaf.depth, finest);
+            BrickInspector::BorderValues border;
+            if (bordersOnCoarser[std::size_t(i)])
+                border = [&](const Vec3i& p, std::span<double> values) {
+                    reconstruction.resolve(level, p, 0, values);
+                };
+            found = scheduler_.wishes().inspector->inspect(leaf, *scheduler_.samples(leaf),
+                                                           scheduler_.frame(), border);
+        });
+        return findings;
+    }
+
+  private:
+    const TetMesh& mesh_;
+    std::span<const int> fields_;
+    const BrickScheduler& scheduler_;
+    std::unordered_set<DepthKey, DepthKeyHash> judged_;
+};
 
 // Where a bound on visible errors isn't kept: what was reached.
-std::string exceededWhereSeen(const RefineOptions& options, const BrickScheduler& scheduler) {
+std::string exceededWhereSeen(const std::string& field, const BrickScheduler& scheduler) {
     double worst = 1;
     for (const GrowingLeaf& leaf : scheduler.tree().leaves())
         worst = std::max(worst, scheduler.errorOverBound(leaf.key));
     if (worst <= 1) return {};
     const double bound = scheduler.wishes().inspector->watchedBound();
-    return "a largest error of " + shortNumber(worst * bound) + " in " + options.transferFunction->field +
-           " where it is seen (bound " + shortNumber(bound) + ")";
+    return "a largest error of " + shortNumber(worst * bound) + " in " + field + " where it is seen (bound " +
+           shortNumber(bound) + ")";
+}
+
+const std::string& watchedField(const TetMesh& mesh, std::span<const int> fields,
+                                const RefineOptions& options) {
+    return options.transferFunction && !options.transferFunction->field.empty()
+               ? options.transferFunction->field
+               : mesh.fields[std::size_t(fields[0])].name;
 }
 
 }  // namespace
@@ -82,6 +109,12 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
                        std::shared_ptr<BrickArchive> archive) {
     if (!options.criterion.has(Criterion::visibility) && !archive)
         return refineAndResample(mesh, fields, resampler, options, execution);
+    const bool byError = options.criterion.has(Criterion::error);
+    if (byError && options.measure == ErrorMeasure::rms)
+        throw InputError(
+            "an RMS error is one of the whole mesh: with visibility, or bricks that are kept in a log, "
+            "choose "
+            "the largest error");
     Timer timer;
     execution.report(Stage::planning, 0, 1);
     ScheduleOptions schedule{
@@ -97,16 +130,18 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
     execution.report(Stage::sampling, 0, 1);
     const NearestOnDemand nearest(mesh, execution.threads);
     BricksShown shown;
-    for (std::size_t leaves = 0;;) {
+    BorderJudge borders(mesh, fields, scheduler);
+    for (std::int64_t published = -1;;) {
         scheduler.finish(execution);
-        if (scheduler.tree().leafCount() == leaves) break;
-        leaves = scheduler.tree().leafCount();
+        if (scheduler.counts().published == published) break;  // what was found asks for no more
+        published = scheduler.counts().published;
+        if (scheduler.tree().leafCount() == 0) throw InputError("the bounds do not meet the mesh");
         const Depth finest = options.frame ? scheduler.frame().maxDepth : scheduler.tree().deepest();
+        shown = {};
         shown = bricksOf(scheduler, finest);
-        if (!options.criterion.has(Criterion::error)) break;
-        const Reconstruction reconstruction(mesh, fields, shown.tree, shown.store, nearest);
-        std::vector<LeafFindings> findings =
-            findAcrossBorders(scheduler, shown, finest, reconstruction, execution);
+        // Without room for all that is wished for already there is none for more.
+        if (!byError || scheduler.isCutShort()) break;
+        std::vector<LeafFindings> findings = borders.judge(shown, finest, nearest, execution);
         scheduler.setFindings(findings);
     }
     result.tree = std::move(shown.tree);
@@ -126,13 +161,16 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
     measure.boundsWorld = options.boundsWorld;
     result.report = measureError(mesh, fields, result.tree, result.store, nearest, execution, measure);
     result.times.verifyMs = timer.elapsedMs();
-    const std::string exceeded = !options.criterion.has(Criterion::error) ? std::string()
+    const std::string exceeded = !byError ? std::string()
                                  : isBoundedEverywhere(options)
                                      ? exceededBound(mesh, fields, options, result.report)
-                                     : exceededWhereSeen(options, scheduler);
+                                     : exceededWhereSeen(watchedField(mesh, fields, options), scheduler);
     result.bounded = exceeded.empty();
     if (result.bounded) return result;
-    result.stoppedBecause = scheduler.isCutShort() ? "the bound on voxels" : "the finest spacing allowed";
+    result.stoppedBecause = scheduler.isCutShort() ? "the bound on voxels"
+                            : scheduler.tree().deepest() < scheduler.frame().maxDepth
+                                ? "no brick left to split"
+                                : "the finest spacing allowed";
     result.stoppedBecause += " ended the refinement at " + exceeded;
     return result;
 }

@@ -1025,8 +1025,10 @@ class Refinement(AppTest):
                 ("--refine focus", ["--focus", "1,2,3", "--radius", "1"]),
                 ("--transfer-function", ["--refine", "error,visibility", "--max-error", "1%"]),
                 ("visibility", ["--refine", "error", "--max-error", "1%", "--transfer-function", "tf.json"]),
+                ("rms --resume", ["--refine", "error", "--max-error", "1%", "--error-measure", "rms", "--resume", "log"]),
                 ("--resume uniform", ["--refine", "uniform", "--resolution", "30", "--resume", "log"])):
             self.reject(2, words, "resample", self.stokes, "-o", "out.vdb", *options)
+        self.assertFalse((self.folder / "log").exists())
 
     def test_a_transfer_function_is_read_strictly(self):
         seen = ("--refine", "element-size,visibility", "--transfer-function")

@@ -155,6 +155,32 @@ TEST(Schedule, BricksKeepToTheBoundAcrossBorders) {
     }
 }
 
+// Within bounds and of what is seen; a bound that can't be kept is told, one that can't be judged refused.
+TEST(Schedule, BoundsOfVisibleErrorsAreJudged) {
+    TESSERA_ON_ONE_THREAD;
+    const TetMesh mesh = meshWithField(ballMesh(6, 1));
+    const std::vector<int> fields{0};
+    const SoftwareResampler resampler;
+    RefineOptions refine = optionsFor(Criterion::error | Criterion::visibility, 1).refine;
+    const ValueRange range = finiteFloatRange(mesh.fields[0], 0);
+    refine.transferFunction = {"", {{range.min, {0, 0, 0}, 0.5}, {range.max, {1, 1, 1}, 0.5}}};
+    refine.boundsWorld = Box3d{Vec3d(-0.4, -0.7, 0), Vec3d(0.5, 0.8, 0.9)};
+    for (const int resolution : {0, 12}) {
+        refine.resolution = resolution;
+        const BrickResult result = makeBricks(mesh, fields, resampler, refine, {.threads = 1});
+        // All differences are seen, so the measured error tells the same.
+        EXPECT_EQ(result.bounded, result.report.fields[0].relativeMax <= refine.maxError);
+        EXPECT_EQ(result.bounded, resolution == 0);
+        EXPECT_EQ(result.stoppedBecause.find("wave where it is seen") != std::string::npos, !result.bounded);
+    }
+    const auto make = [&] { makeBricks(mesh, fields, resampler, refine, {.threads = 1}); };
+    refine.measure = ErrorMeasure::rms;
+    EXPECT_THROW(make(), InputError);
+    refine.measure = ErrorMeasure::max;
+    refine.boundsWorld = Box3d{Vec3d(5), Vec3d(6)};
+    EXPECT_THROW(make(), InputError);
+}
+
 TEST(Schedule, RefinesOnlyWhatIsSeen) {
     TESSERA_ON_ONE_THREAD;
     ScheduleOptions options = optionsFor(Criterion::error, 100'000);
