@@ -18,10 +18,8 @@ constexpr double kNotFinite = std::numeric_limits<double>::quiet_NaN();
 
 bool isFlat(const TetMesh& mesh, std::int32_t element) {
     const auto& tet = mesh.tets[std::size_t(element)];
-    const Vec3d &a = mesh.points[std::size_t(tet[0])], &b = mesh.points[std::size_t(tet[1])],
-                &c = mesh.points[std::size_t(tet[2])], &d = mesh.points[std::size_t(tet[3])];
-    const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
-    return std::abs(sixfold.value) <= sixfold.errorBound && exactVolumeSign(a, b, c, d) == 0;
+    return volumeSign(mesh.points[std::size_t(tet[0])], mesh.points[std::size_t(tet[1])],
+                      mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]) == 0;
 }
 }  // namespace
 

@@ -113,8 +113,7 @@ BrickResult makeBricks(const TetMesh& mesh, std::span<const int> fields, const R
     if (byError && options.measure == ErrorMeasure::rms)
         throw InputError(
             "an RMS error is one of the whole mesh: with visibility, or bricks that are kept in a log, "
-            "choose "
-            "the largest error");
+            "choose the largest error");
     Timer timer;
     execution.report(Stage::planning, 0, 1);
     ScheduleOptions schedule{
