@@ -4,7 +4,10 @@
 
 add_library(tessera_flags INTERFACE)
 target_compile_options(tessera_flags INTERFACE
-  -pthread -ffp-contract=off -Wall -Wextra -Wshadow -Wconversion $<$<BOOL:${TESSERA_WERROR}>:-Werror>)
+  -pthread -ffp-contract=off -Wall -Wextra -Wshadow -Wconversion
+  # Signs are no part of GCC's -Wconversion for C++; & of comparisons is meant, where a branch would cost more.
+  $<$<CXX_COMPILER_ID:Clang>:-Wno-sign-conversion;-Wno-bitwise-instead-of-logical>
+  $<$<BOOL:${TESSERA_WERROR}>:-Werror>)
 if(TESSERA_SANITIZE)
   target_compile_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
@@ -12,6 +15,12 @@ if(TESSERA_SANITIZE)
     target_compile_options(tessera_flags INTERFACE -fno-sanitize=${TESSERA_SANITIZE_LESS})
   endif()
   target_link_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE})
+  # What the code asks, in place of each compiler's own way to tell.
+  if(TESSERA_SANITIZE MATCHES address)
+    target_compile_definitions(tessera_flags INTERFACE TESSERA_ADDRESS_SANITIZER)
+  elseif(TESSERA_SANITIZE MATCHES thread)
+    target_compile_definitions(tessera_flags INTERFACE TESSERA_THREAD_SANITIZER)
+  endif()
 endif()
 
 include(TesseraPrecompiled)
@@ -35,7 +44,7 @@ function(tessera_layer name)
   if(ARG_UNITY OR TESSERA_UNITY)
     set_target_properties(tessera_${name} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 7)
     # It asks whether a type stands in the file compiled, which is never so here.
-    target_compile_options(tessera_${name} PRIVATE -Wno-subobject-linkage)
+    target_compile_options(tessera_${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   endif()
   set_property(GLOBAL APPEND PROPERTY TESSERA_LAYERS ${name})
 endfunction()

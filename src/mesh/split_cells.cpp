@@ -11,13 +11,13 @@
 #include "base/large_pages.h"
 #include "base/parallel.h"
 #include "mesh/geometry.h"
+#include "mesh/tet_complex.h"
 
 namespace tessera {
 
 namespace {
 
 using Triangle = std::array<std::int32_t, 3>;
-using Tet = std::array<std::int32_t, 4>;
 
 constexpr std::int64_t kCellChunk = 1 << 12;
 

@@ -23,7 +23,7 @@
 #include "reader/reader_report.h"
 #include "tessera/error.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
 #define TESSERA_SHADOW_MEMORY 1  // terabytes of address space: no limit can be set
 #endif
 

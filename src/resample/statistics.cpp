@@ -16,7 +16,8 @@ auto* find(Entries& entries, std::string_view name) {
 template <class Value>
 Value& at(std::vector<ResampleStatistics::Entry<Value>>& entries, std::string_view name) {
     if (auto* entry = find(entries, name)) return entry->value;
-    return entries.emplace_back(name, Value(0)).value;
+    entries.push_back({name, Value(0)});
+    return entries.back().value;
 }
 
 }  // namespace

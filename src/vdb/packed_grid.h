@@ -88,7 +88,10 @@ template <class Grid>
 class PackedGrid final : public Grid {
   public:
     using Leaf = typename Grid::TreeType::LeafNodeType;
-    using Grid::Grid;
+
+    /// Through a tree: OpenVDB's shared library keeps its constructor from a background to itself.
+    explicit PackedGrid(const typename Grid::ValueType& background)
+        : Grid(std::make_shared<typename Grid::TreeType>(background)) {}
 
     /// Takes a leaf node that was made for this grid's background and precision.
     void add(std::unique_ptr<Leaf> maskOnly, PackedLeaf bytes) {

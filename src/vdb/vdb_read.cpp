@@ -77,7 +77,7 @@ void limitReader(std::uint64_t fileBytes) {
     const rlim_t seconds = 10 + rlim_t(fileBytes >> 20);
     const rlimit cpu{seconds, seconds};
     ::setrlimit(RLIMIT_CPU, &cpu);
-#ifndef __SANITIZE_ADDRESS__  // it reserves terabytes itself
+#ifndef TESSERA_ADDRESS_SANITIZER  // it reserves terabytes itself
     const rlim_t bytes = rlim_t(addressSpaceBytes() + (std::uint64_t(256) << 20) + 64 * fileBytes);
     const rlimit memory{bytes, bytes};
     ::setrlimit(RLIMIT_AS, &memory);

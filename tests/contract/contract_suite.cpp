@@ -19,12 +19,12 @@ namespace tessera::contract {
 
 namespace {
 
-#if defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_THREAD_SANITIZER)
 constexpr bool kIsThreadSanitized = true;
 #else
 constexpr bool kIsThreadSanitized = false;
 #endif
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(TESSERA_ADDRESS_SANITIZER)
 constexpr bool kIsAddressSanitized = true;
 #else
 constexpr bool kIsAddressSanitized = false;

@@ -12,7 +12,7 @@
 namespace tessera {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
 constexpr bool kIsSanitized = true;  // rationals take ten times as long
 #else
 constexpr bool kIsSanitized = false;

@@ -277,7 +277,7 @@ TEST_P(Gl, APersistentMapShowsWhatTheDeviceDidBeforeTheFence) {
 }
 
 // Under a sanitizer a context takes a quarter of a second.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
 constexpr int kContexts = 10;
 #else
 constexpr int kContexts = 100;
@@ -300,7 +300,7 @@ TEST_P(Gl, AContextCanBeMadeAndEndedManyTimes) {
     for (int i = 0; i < kContexts; ++i) cycle();
     const std::int64_t grownBytes = residentBytes() - before;
     RecordProperty("grown_bytes", std::to_string(grownBytes));
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TESSERA_ADDRESS_SANITIZER
     constexpr std::int64_t kBoundBytes = 100'000'000;  // freed memory stays in quarantine
 #else
     constexpr std::int64_t kBoundBytes = 4'000'000;

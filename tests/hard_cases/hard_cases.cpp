@@ -81,10 +81,10 @@ void addThinElements(Gallery& gallery) {
     const std::string range = ", aspect ratio 1e-2 to 1e-12";
     for (const auto& [kind, plural, title, shape] : kKinds) {
         const auto seed = std::uint64_t(kind) * 100 + 7;
-        const auto each = [&](const char* suffix, const auto& make) {
+        const auto each = [&, kind = kind, title = title](const char* suffix, const auto& make) {
             for (const int exponent : kExponents)
                 gallery.mesh(title + std::string(suffix) + "1e" + std::to_string(exponent),
-                             [make, kind = kind, exponent, seed] {
+                             [make, kind, exponent, seed] {
                                  return make(kind, tenToMinus(exponent), seed + std::uint64_t(exponent));
                              });
         };

@@ -24,7 +24,9 @@ const Vec3d& nodeOf(const TetMesh& mesh, const Tet& tet, std::size_t corner) {
 
 /// A multiple of 1/16 about the middle of the unit box.
 Vec3d latticePlace(Random& random) {
-    return Vec3d(7 + random.below(3), 7 + random.below(3), 7 + random.below(3)) / 16.0;
+    // In this order, whichever compiler: the list of hashes was made so.
+    const int z = random.below(3), y = random.below(3), x = random.below(3);
+    return Vec3d(7 + x, 7 + y, 7 + z) / 16.0;
 }
 
 /// A small good element in the corners (0, 0, 0) and (1, 1, 1).
@@ -163,7 +165,10 @@ TetMesh flatElements(FlatKind kind, int count, std::uint64_t seed) {
     TetMesh mesh;
     Random random(seed);
     // Multiples of 1/16, so that sums are exact and the elements exactly flat.
-    const auto place = [&] { return Vec3d(random.below(17), random.below(17), random.below(17)) / 16.0; };
+    const auto place = [&] {
+        const int z = random.below(17), y = random.below(17), x = random.below(17);
+        return Vec3d(x, y, z) / 16.0;
+    };
     while (mesh.elementCount() < count) {
         const Vec3d a = place(), b = place(), c = place();
         const std::int32_t first = addNode(mesh, a);

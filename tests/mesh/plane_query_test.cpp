@@ -16,7 +16,7 @@ namespace tessera {
 namespace {
 
 /// Rationals are slow where memory is watched.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
 constexpr int kTrials = 12;
 #else
 constexpr int kTrials = 40;

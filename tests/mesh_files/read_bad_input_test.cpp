@@ -11,7 +11,7 @@
 #include "tessera/error.h"
 #include "vtu_text.h"
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TESSERA_ADDRESS_SANITIZER
 // VTK 9.1's legacy reader loses its cell arrays when a file ends early.
 extern "C" const char* __lsan_default_suppressions() {
     return "leak:vtkCellArray::New\n";

@@ -51,7 +51,7 @@ TEST_P(RasterRuns, AThousandLeakNeitherObjectsNorMemory) {
     [[maybe_unused]] const std::int64_t bytes = residentBytes();
     for (int i = 0; i < kRuns; ++i) run(i);
     EXPECT_EQ(liveObjects(GetParam()), objects);
-#ifndef __SANITIZE_ADDRESS__  // which keeps freed memory for a while
+#ifndef TESSERA_ADDRESS_SANITIZER  // which keeps freed memory for a while
     // One texture of 64 KiB a run would be 62 MiB.
     EXPECT_LT(residentBytes() - bytes, 24 << 20);
 #endif

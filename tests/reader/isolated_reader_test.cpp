@@ -178,7 +178,7 @@ TEST_F(IsolatedReaderTest, ThreadsAreWithinTheMemoryLimit) {
     EXPECT_EQ(tell("threads", 1024, 3), 3);
     EXPECT_EQ(tell("threads", 40, 64), 1);
     EXPECT_LE(tell("threads", 1024, 64) * 9 * 8, 1024);
-#ifndef __SANITIZE_ADDRESS__
+#ifndef TESSERA_ADDRESS_SANITIZER
     for (const int threads : {1, 64}) {
         EXPECT_LE(tell("count-memory", 200, threads), 200);
         EXPECT_GE(tell("count-memory", 200, threads), 150);
@@ -187,14 +187,14 @@ TEST_F(IsolatedReaderTest, ThreadsAreWithinTheMemoryLimit) {
 }
 
 TEST_F(IsolatedReaderTest, EndlessAllocationEndsAtTheMemoryLimit) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TESSERA_ADDRESS_SANITIZER
     GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
 #endif
     EXPECT_PRED2(has, refusal("allocate", {200 << 20, 60}), "more than 200 MiB");
 }
 
 TEST_F(IsolatedReaderTest, MemoryThatTheParentMayNotUseIsABadAllocation) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef TESSERA_ADDRESS_SANITIZER
     GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
 #endif
     rlimit before{};

@@ -22,7 +22,7 @@
 namespace tessera {
 
 /// Under a sanitizer all is many times slower.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
 inline constexpr bool kIsWatched = true;
 #else
 inline constexpr bool kIsWatched = false;

@@ -14,7 +14,7 @@ namespace {
 
 using Clock = BrickScheduler::Clock;
 
-#ifdef __SANITIZE_THREAD__
+#ifdef TESSERA_THREAD_SANITIZER
 #define TESSERA_ON_ONE_THREAD GTEST_SKIP() << "runs on one thread: nothing for this sanitizer to find"
 #else
 #define TESSERA_ON_ONE_THREAD static_cast<void>(0)

@@ -125,7 +125,7 @@ TEST_F(VdbFailureTest, FilesOfOtherProgramsGiveTheirLattice) {
     // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never
     // in a crash.
     const std::string good = readBytes(file("other.vdb"));
-#ifdef __SANITIZE_ADDRESS__  // without a limit on memory some take all the time they may
+#ifdef TESSERA_ADDRESS_SANITIZER  // without a limit on memory some take all the time they may
     constexpr std::uint32_t kDamagedFiles = 6;
 #else
     constexpr std::uint32_t kDamagedFiles = 60;
