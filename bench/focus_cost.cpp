@@ -64,6 +64,11 @@ class Watch : public BrickTarget {
     Timer timer;
 };
 
+/// A tree that was planned and sampled at once.
+struct AtOnce {
+    double ms = 0, voxels = 0, inMesh = 0;
+};
+
 std::string figures(const std::vector<double>& ms) {
     return fmt::format("median {:.2f} ms, 99 % {:.2f}, most {:.2f}", quantile(ms, 0.5), quantile(ms, 0.99),
                        quantile(ms, 1));
@@ -158,19 +163,20 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         const double planMs = timer.restart();
         const auto bound = resampler.bind(mesh, fields, refine.bind);
         ResampleStatistics statistics;
-        resampleTree(tree, *bound, channels, execution, statistics);
-        const double ms = timer.elapsedMs();
-        std::printf("  %s: plan %.0f ms, samples %.0f ms, %.3g voxels\n",
-                    criterion == Criterion::uniform ? "uniform" : "focus, offline", planMs, ms,
-                    double(tree.leafCount()) * brickPoints);
-        return std::pair(ms + planMs, double(tree.leafCount()) * brickPoints);
+        const BrickStore store = resampleTree(tree, *bound, channels, execution, statistics);
+        AtOnce made{timer.elapsedMs() + planMs, double(tree.leafCount()) * brickPoints,
+                    double(store.coveredPoints())};
+        std::printf("  %s: plan %.0f ms, samples %.0f ms, %.3g voxels, %.3g of them in the mesh\n",
+                    criterion == Criterion::uniform ? "uniform" : "focus, offline", planMs, made.ms - planMs,
+                    made.voxels, made.inMesh);
+        return made;
     };
-    const double offlineMs = sampleAtOnce(Criterion::focus).first;
-    const auto [uniformMs, uniformVoxels] = sampleAtOnce(Criterion::uniform);
+    const AtOnce offline = sampleAtOnce(Criterion::focus), uniform = sampleAtOnce(Criterion::uniform);
     std::printf(
-        "  over uniform: %.2f %% of the voxels; from nothing to rest %.1f %% of the time, offline %.1f %%\n",
-        100 * double(leaves) * brickPoints / uniformVoxels, 100 * firstMs / uniformMs,
-        100 * offlineMs / uniformMs);
+        "  over uniform: %.2f %% of the voxels, %.2f %% of those in the mesh; from nothing to rest %.1f %% "
+        "of the time, offline %.1f %%\n",
+        100 * double(leaves) * brickPoints / uniform.voxels, 100 * offline.inMesh / uniform.inMesh,
+        100 * firstMs / uniform.ms, 100 * offline.ms / uniform.ms);
 
     std::vector<double> better, rest, over, call;
     const std::int64_t sampledBefore = scheduler.counts().sampled;

@@ -67,12 +67,14 @@ class Measurement {
     std::vector<Part> measureNodes(const NodeSet& used);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
+    bool findLeaf(const Vec3d& placeWorld, std::int32_t& leaf, Vec3d& local) const;
     void locate(Batch& batch) const;
     bool findCorners(std::size_t leaf, const Vec3i& cell, std::array<const float*, 8>& corner) const;
     void measureBatch(Batch& batch, Part& part);
     bool fieldErrors(const Batch& batch, std::size_t i, std::span<double> errors) const;
     void keep(std::uint32_t sample, std::int32_t leaf, std::span<const double> errors, Part& part);
     void addWeighted(std::size_t f, std::size_t sample, double weight, FieldSums& sums) const;
+    void addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const;
     double centroidWeight(const SampledField& field) const { return field.isCell() ? 1 : kCentroidWeight; }
     void measureDeferred(std::vector<Part>& parts);
     void advance(std::int64_t pieces);
@@ -87,6 +89,7 @@ class Measurement {
     const Execution& execution_;
     std::vector<double>* leafErrors_;
     std::optional<Box3d> bounds_;  // from the tree's origin
+    double inverseSpacing0_;       // of level 0, 1 / world units
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
     std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
@@ -102,6 +105,7 @@ Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, cons
       reconstruction_(reconstruction),
       execution_(execution),
       leafErrors_(leafErrors),
+      inverseSpacing0_(1.0 / tree.spacingWorld(0)),
       tiles_(tree, store, execution),
       lists_(samples.fields().size()) {
     for (std::vector<float>& list : lists_) {
@@ -154,21 +158,40 @@ bool Measurement::findCorners(std::size_t leaf, const Vec3i& cell,
     return true;
 }
 
+// The leaf that holds a place, and the place in its index space from its first point. Samples come near the
+// last one, so its leaf is tried first.
+bool Measurement::findLeaf(const Vec3d& placeWorld, std::int32_t& leaf, Vec3d& local) const {
+    const auto localIn = [&](const LeafTiles::Leaf& in) {
+        return placeWorld * in.inverseSpacing - in.firstPoint;
+    };
+    if (leaf >= 0) {
+        const double edge = tree_.brickCells();
+        local = localIn(tiles_.leaf(std::size_t(leaf)));
+        if (local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < edge && local.y < edge &&
+            local.z < edge)
+            return true;
+    }
+    leaf = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
+    if (leaf >= 0) local = localIn(tiles_.leaf(std::size_t(leaf)));
+    return leaf >= 0;
+}
+
 void Measurement::locate(Batch& batch) const {
-    const double inverse0 = 1.0 / tree_.spacingWorld(0);
     const int brickCells = tree_.brickCells();
+    std::int32_t last = -1;
     for (std::size_t i = 0; i < batch.count; ++i) {
         const Vec3d& place = batch.placeWorld[i];
+        Vec3d local;
         batch.direct[i] = false;
-        batch.leaf[i] = bounds_ && !contains(*bounds_, place) ? -1 : leafOfPlace(tree_, place * inverse0);
-        if (batch.leaf[i] < 0) continue;
-        const std::size_t leafIndex = std::size_t(batch.leaf[i]);
-        const LeafTiles::Leaf& leaf = tiles_.leaf(leafIndex);
-        const CellPlace at = locateInBrick(place * leaf.inverseSpacing - leaf.firstPoint, brickCells);
+        batch.leaf[i] = -1;
+        if (bounds_ && !contains(*bounds_, place)) continue;
+        if (!findLeaf(place, last, local)) continue;
+        batch.leaf[i] = last;
+        const CellPlace at = locateInBrick(local, brickCells);
         batch.fraction[i] = at.fraction;
-        const int low = leaf.firstCell;
+        const int low = tiles_.leaf(std::size_t(last)).firstCell;
         if (at.cell.x < low || at.cell.y < low || at.cell.z < low) continue;
-        if (!findCorners(leafIndex, at.cell, batch.corner[i])) continue;
+        if (!findCorners(std::size_t(last), at.cell, batch.corner[i])) continue;
         batch.direct[i] = true;
         // Corners 4 to 7 lie beside these along z, mostly in the same cache line.
         for (std::size_t c = 0; c < 4; ++c) __builtin_prefetch(batch.corner[i][c]);
@@ -307,30 +330,45 @@ void Measurement::addWeighted(std::size_t f, std::size_t sample, double weight, 
     sums.weights += weight;
 }
 
+// What a batch of elements adds: their centroids and nodes, one after the other. The sums stay in registers.
+void Measurement::addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const {
+    const float* errors = lists_[f].data();
+    const bool isCell = samples_.fields()[f].isCell();
+    const double ofCentroid = centroidWeight(samples_.fields()[f]);
+    double squares = sums.squares, weights = sums.weights;
+    const auto add = [&](std::size_t sample, double weight) {
+        // No sample, or a deferred centroid, whose weight is added when it has an error: adds 0, in place of
+        // a branch that nothing could foretell.
+        const bool isMeasured = errors[sample] >= 0;
+        const double error = isMeasured ? double(errors[sample]) : 0, share = isMeasured ? weight : 0;
+        squares += share * error * error;
+        weights += share;
+    };
+    for (std::size_t i = 0; i < batch.count; ++i) {
+        add(batch.sample[i], ofCentroid * batch.volume[i]);
+        if (isCell) continue;
+        for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
+            add(std::size_t(node), kNodeWeight * batch.volume[i]);
+    }
+    sums.squares = squares;
+    sums.weights = weights;
+}
+
 // The nodes' errors are known by now.
 std::vector<Part> Measurement::measureElements() {
     std::vector<Part> parts(std::size_t((mesh_.elementCount() + kErrorChunk - 1) / kErrorChunk));
-    parallelForChunks(
-        execution_, mesh_.elementCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
-            Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
-            Batch batch(samples_.channels());
-            for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
-                gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
-                measureBatch(batch, part);
-                for (std::size_t f = 0; f < lists_.size(); ++f) {
-                    const SampledField& field = samples_.fields()[f];
-                    for (std::size_t i = 0; i < batch.count; ++i) {
-                        // A deferred centroid still has no error here; its weight is added when it has.
-                        addWeighted(f, batch.sample[i], centroidWeight(field) * batch.volume[i],
-                                    part.sums[f]);
-                        if (field.isCell()) continue;
-                        for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
-                            addWeighted(f, std::size_t(node), kNodeWeight * batch.volume[i], part.sums[f]);
-                    }
-                }
-            }
-            advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
-        });
+    parallelForChunks(execution_, mesh_.elementCount(), kErrorChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
+                          Batch batch(samples_.channels());
+                          for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
+                              gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
+                              measureBatch(batch, part);
+                              for (std::size_t f = 0; f < lists_.size(); ++f)
+                                  addBatch(f, batch, part.sums[f]);
+                          }
+                          advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
+                      });
     measureDeferred(parts);
     return parts;
 }
