@@ -221,11 +221,15 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
                     what, samplingMs, restMs, 100 * restMs / samplingMs);
     };
     shareOfRest("from nothing to rest");
+    std::vector<double> voxelShares;
     for (int jump = 0; jump < options.jumps; ++jump) {
         single.setFocus({pointFocus(node(), radius)});
         single.finish({.threads = 1});
+        voxelShares.push_back(100 * double(single.tree().leafCount()) * brickPoints / uniform.voxels);
     }
     shareOfRest("and the jumps");
+    std::printf("  voxels over uniform, of all these places: least %.2f %%, median %.2f, most %.2f\n",
+                quantile(voxelShares, 0), quantile(voxelShares, 0.5), quantile(voxelShares, 1));
     measurePlans(mesh, bounds, schedule.refine, execution);
 }
 
