@@ -228,8 +228,10 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         voxelShares.push_back(100 * double(single.tree().leafCount()) * brickPoints / uniform.voxels);
     }
     shareOfRest("and the jumps");
-    std::printf("  voxels over uniform, of all these places: least %.2f %%, median %.2f, most %.2f\n",
-                quantile(voxelShares, 0), quantile(voxelShares, 0.5), quantile(voxelShares, 1));
+    if (!voxelShares.empty())
+        std::printf(
+            "  voxels over uniform, at rest around these places: least %.2f %%, median %.2f, most %.2f\n",
+            quantile(voxelShares, 0), quantile(voxelShares, 0.5), quantile(voxelShares, 1));
     measurePlans(mesh, bounds, schedule.refine, execution);
 }
 

@@ -35,6 +35,8 @@ if(TESSERA_BUILD_IO)
   find_package(fmt REQUIRED)
   add_library(tessera_openvdb INTERFACE IMPORTED)
   target_include_directories(tessera_openvdb SYSTEM INTERFACE ${OPENVDB_INCLUDE_DIR})
+  # Members of its classes that the shared library keeps to itself must be inlined, which clang does from -O2 on.
+  target_compile_options(tessera_openvdb INTERFACE $<$<CXX_COMPILER_ID:Clang>:-O2>)
   target_link_libraries(tessera_openvdb INTERFACE ${OPENVDB_LIBRARY} TBB::tbb PkgConfig::OPENEXR)
   # Headers alone, which compress by Blosc.
   find_path(NANOVDB_INCLUDE_DIR nanovdb/util/OpenToNanoVDB.h REQUIRED)

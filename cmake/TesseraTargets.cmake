@@ -15,12 +15,6 @@ if(TESSERA_SANITIZE)
     target_compile_options(tessera_flags INTERFACE -fno-sanitize=${TESSERA_SANITIZE_LESS})
   endif()
   target_link_options(tessera_flags INTERFACE -fsanitize=${TESSERA_SANITIZE})
-  # What the code asks, in place of each compiler's own way to tell.
-  if(TESSERA_SANITIZE MATCHES address)
-    target_compile_definitions(tessera_flags INTERFACE TESSERA_ADDRESS_SANITIZER)
-  elseif(TESSERA_SANITIZE MATCHES thread)
-    target_compile_definitions(tessera_flags INTERFACE TESSERA_THREAD_SANITIZER)
-  endif()
 endif()
 
 include(TesseraPrecompiled)

@@ -4,7 +4,7 @@ if(TESSERA_BUILD_IO)
     LINK vdb PRIVATE_LINK tessera_openvdb VTK::CommonCore VTK::CommonDataModel VTK::CommonExecutionModel VTK::IOXML)
   set_target_properties(vdb_test PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
   if(TESSERA_SANITIZE MATCHES undefined)
-    target_compile_options(vdb_test PRIVATE -fno-sanitize=undefined -O2)  # as in src/vdb
+    target_compile_options(vdb_test PRIVATE -fno-sanitize=undefined)  # as in src/vdb
   endif()
   tessera_test(vdb_metadata_test FOLDER vdb LINK vdb)
   tessera_test(stored_bricks_test FOLDER pool OPTIMISED LINK pool vdb software)

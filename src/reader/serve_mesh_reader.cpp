@@ -16,6 +16,7 @@
 #include <new>
 #include <system_error>
 
+#include "base/sanitizers.h"
 #include "base/timer.h"
 #include "reader/isolated_reader.h"
 #include "reader/mesh_packet.h"

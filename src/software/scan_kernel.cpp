@@ -18,6 +18,7 @@
 #include <span>
 #include <vector>
 
+#include "base/sanitizers.h"
 #include "software/scan_kernel.h"
 
 #undef HWY_TARGET_INCLUDE

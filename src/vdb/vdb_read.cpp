@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "base/floor_div.h"
+#include "base/sanitizers.h"
 #include "files/file_digest.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"

@@ -1,4 +1,5 @@
 #include "contract_suite.h"
+#include "base/sanitizers.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #include "reference/oracle.h"
+#include "base/sanitizers.h"
 
 #include <gtest/gtest.h>
 

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <thread>
 
+#include "base/sanitizers.h"
 #include "gl/gl_program.h"
 #include "gl/gl_thread.h"
 #include "gl_test/shaders.h"

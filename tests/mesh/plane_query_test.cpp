@@ -1,4 +1,5 @@
 #include "mesh/plane_query.h"
+#include "base/sanitizers.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>

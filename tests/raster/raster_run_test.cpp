@@ -5,6 +5,7 @@
 #include <future>
 #include <thread>
 
+#include "base/sanitizers.h"
 #include "hybrid/slice_polygon_generator.h"
 #include "raster/hard_elements.h"
 #include "raster/regions.h"

@@ -1,4 +1,5 @@
 #include "reader/isolated_reader.h"
+#include "base/sanitizers.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+#include "base/sanitizers.h"
 #include "schedule/brick_scheduler.h"
 
 #include <gtest/gtest.h>

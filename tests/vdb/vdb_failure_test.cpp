@@ -1,5 +1,6 @@
 #include <atomic>
 
+#include "base/sanitizers.h"
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"

@@ -1,0 +1,20 @@
+#pragma once
+
+// TESSERA_ADDRESS_SANITIZER, TESSERA_THREAD_SANITIZER: defined where the compiler, GCC or clang, puts that
+// sanitizer into the code. With this file included, ask by #ifdef.
+
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define TESSERA_ADDRESS_SANITIZER
+#endif
+#if __has_feature(thread_sanitizer)
+#define TESSERA_THREAD_SANITIZER
+#endif
+#endif
+
+#if defined(__SANITIZE_ADDRESS__) && !defined(TESSERA_ADDRESS_SANITIZER)
+#define TESSERA_ADDRESS_SANITIZER
+#endif
+#if defined(__SANITIZE_THREAD__) && !defined(TESSERA_THREAD_SANITIZER)
+#define TESSERA_THREAD_SANITIZER
+#endif
