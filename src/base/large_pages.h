@@ -18,4 +18,11 @@ void reserveLarge(std::vector<Item>& items, std::size_t count) {
     preferLargePages(items.data() + items.size(), (items.capacity() - items.size()) * sizeof(Item));
 }
 
+/// The same, and so many items in it.
+template <class Item>
+void resizeLarge(std::vector<Item>& items, std::size_t count) {
+    reserveLarge(items, count);
+    items.resize(count);
+}
+
 }  // namespace tessera

@@ -1,7 +1,7 @@
 #pragma once
 
 // TESSERA_ADDRESS_SANITIZER, TESSERA_THREAD_SANITIZER: defined where the compiler, GCC or clang, puts that
-// sanitizer into the code. With this file included, ask by #ifdef.
+// sanitizer into the code. With this file included, ask by #ifdef, or by the constants below.
 
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
@@ -18,3 +18,20 @@
 #if defined(__SANITIZE_THREAD__) && !defined(TESSERA_THREAD_SANITIZER)
 #define TESSERA_THREAD_SANITIZER
 #endif
+
+namespace tessera {
+
+#ifdef TESSERA_ADDRESS_SANITIZER
+inline constexpr bool kIsAddressSanitized = true;
+#else
+inline constexpr bool kIsAddressSanitized = false;
+#endif
+#ifdef TESSERA_THREAD_SANITIZER
+inline constexpr bool kIsThreadSanitized = true;
+#else
+inline constexpr bool kIsThreadSanitized = false;
+#endif
+/// All is many times slower then.
+inline constexpr bool kIsSanitized = kIsAddressSanitized || kIsThreadSanitized;
+
+}  // namespace tessera

@@ -6,7 +6,9 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <utility>
 
+#include "base/large_pages.h"
 #include "base/parallel.h"
 
 namespace tessera {
@@ -14,8 +16,10 @@ namespace tessera {
 namespace {
 
 constexpr std::int64_t kIndexChunk = 1 << 13;
-/// Parts that are sorted by themselves before they are merged.
-constexpr std::size_t kSortParts = 8;
+/// Elements are shared out to so many parts of the Morton curve, each of which is sorted by itself.
+constexpr std::size_t kSortParts = 256;
+/// Elements whose keys tell where the parts begin.
+constexpr std::int64_t kSampledKeys = 16 * std::int64_t(kSortParts);
 /// Fewer numbers are sorted by comparison.
 constexpr std::size_t kRadixFrom = 512;
 /// Numbers that lie so close together, in words of 64 bits, are sorted as bits.
@@ -42,13 +46,14 @@ std::uint64_t spread(std::uint64_t x) {
     return (x | x << 2) & 0x1249249249249249ull;
 }
 
+/// The next float below or above numbers that aren't negative; without a branch.
 float roundedDown(double x) {
     const float f = float(x);
-    return double(f) > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
+    return std::bit_cast<float>(std::bit_cast<std::int32_t>(f) - std::int32_t(double(f) > x));
 }
 float roundedUp(double x) {
     const float f = float(x);
-    return double(f) < x ? std::nextafterf(f, std::numeric_limits<float>::infinity()) : f;
+    return std::bit_cast<float>(std::bit_cast<std::int32_t>(f) + std::int32_t(double(f) < x));
 }
 
 /// Steps in a length of `size`; 0 where it has none to count by.
@@ -107,25 +112,6 @@ Box3d boundsOfElements(const TetMesh& mesh, const Execution& execution) {
     return bounds;
 }
 
-/// Sorts parts by themselves, then merges neighbours: the order is total, so the result is one and the same.
-void sortKeys(std::vector<Keyed>& keys, const Execution& execution) {
-    std::size_t part = (keys.size() + kSortParts - 1) / kSortParts;
-    const auto at = [&](std::size_t i) { return keys.begin() + std::ptrdiff_t(std::min(i, keys.size())); };
-    parallelFor(execution, kSortParts, [&](std::int64_t p) {
-        const std::size_t begin = std::size_t(p) * part;
-        std::sort(at(begin), at(begin + part));
-    });
-    std::vector<Keyed> merged(keys.size());
-    for (std::size_t parts = kSortParts; parts > 1; parts /= 2, part *= 2) {
-        parallelFor(execution, std::int64_t(parts / 2), [&](std::int64_t p) {
-            const std::size_t begin = std::size_t(p) * 2 * part;
-            std::merge(at(begin), at(begin + part), at(begin + part), at(begin + 2 * part),
-                       merged.begin() + std::ptrdiff_t(std::min(begin, keys.size())));
-        });
-        keys.swap(merged);
-    }
-}
-
 }  // namespace
 
 void sortEachOnce(std::vector<std::int32_t>& numbers, std::size_t from) {
@@ -180,59 +166,121 @@ void sortEachOnce(std::vector<std::int32_t>& numbers, std::size_t from) {
     dropRepeated();
 }
 
+/// Places in a group's box, in 256ths of it.
+struct ElementIndex::GroupSteps {
+    std::array<float, 3> origin, perStep;
+
+    explicit GroupSteps(const MappedBox& group) : origin(group.min) {
+        for (std::size_t a = 0; a < 3; ++a) perStep[a] = stepsPer(group.max[a] - group.min[a]);
+    }
+    std::uint8_t at(std::size_t axis, float place) const {
+        return std::uint8_t(std::clamp((place - origin[axis]) * perStep[axis], 0.0f, 255.0f));
+    }
+};
+
 /// The boxes of one level of nodes, and of the groups below all.
 struct ElementIndex::Builder {
     const TetMesh& mesh;
     ElementIndex& index;
     const Execution& execution;
 
+    /// Place on the Morton curve of the middle of an element's box.
+    std::uint64_t key(std::int64_t element) const {
+        constexpr double kCells = double(1 << kMortonBits);
+        const Box3d box = boxOf(mesh, element);
+        std::uint64_t key = 0;
+        for (int a = 0; a < 3; ++a) {
+            const double middle = 0.5 * (index.mapped(box.min[a], a) + index.mapped(box.max[a], a));
+            key |= spread(std::uint64_t(std::clamp(middle * kCells, 0.0, kCells - 1))) << a;
+        }
+        return key;
+    }
+
+    /// The first keys of all parts but the first: about as many elements lie in each, as a sample tells.
+    std::array<std::uint64_t, kSortParts - 1> firstKeys() const {
+        const std::int64_t count = std::min(mesh.elementCount(), kSampledKeys);
+        std::vector<std::uint64_t> sample;
+        for (std::int64_t i = 0; i < count; ++i) sample.push_back(key(i * mesh.elementCount() / count));
+        std::sort(sample.begin(), sample.end());
+        std::array<std::uint64_t, kSortParts - 1> first;
+        for (std::size_t p = 0; p < first.size(); ++p)
+            first[p] = sample[(p + 1) * sample.size() / kSortParts];
+        return first;
+    }
+
+    // Memory that is touched for the first time costs more here than keys that are worked out twice, so those
+    // of one part only are kept at a time.
     void sortElements() {
         const std::int64_t count = mesh.elementCount();
-        std::vector<Keyed> keys(mesh.tets.size());
-        constexpr double kCells = double(1 << kMortonBits);
+        const auto first = firstKeys();
+        std::vector<std::uint8_t> partOf(mesh.tets.size());
+        std::vector<std::array<std::uint32_t, kSortParts>> next(
+            std::size_t((count + kIndexChunk - 1) / kIndexChunk));
         parallelForChunks(execution, count, kIndexChunk, [&](std::int64_t begin, std::int64_t end) {
+            std::array<std::uint32_t, kSortParts>& sizes = next[std::size_t(begin / kIndexChunk)];
             for (std::int64_t e = begin; e < end; ++e) {
-                const Box3d box = boxOf(mesh, e);
-                std::uint64_t key = 0;
-                for (int a = 0; a < 3; ++a) {
-                    const double middle = 0.5 * (index.mapped(box.min[a], a) + index.mapped(box.max[a], a));
-                    const double cell = std::clamp(middle * kCells, 0.0, kCells - 1);
-                    key |= spread(std::uint64_t(cell)) << a;
-                }
-                keys[std::size_t(e)] = {key, std::int32_t(e)};
+                const std::uint64_t k = key(e);
+                std::size_t part = 0;
+                for (std::size_t step = kSortParts / 2; step > 0; step /= 2)
+                    part += first[part + step - 1] <= k ? step : 0;
+                partOf[std::size_t(e)] = std::uint8_t(part);
+                ++sizes[part];
             }
         });
-        sortKeys(keys, execution);
-        index.order_.resize(keys.size());
-        for (std::size_t i = 0; i < keys.size(); ++i) index.order_[i] = keys[i].element;
+        std::array<std::uint32_t, kSortParts + 1> partBegin{};
+        for (std::size_t p = 0; p < kSortParts; ++p) {
+            std::uint32_t place = partBegin[p];
+            for (auto& chunk : next) place += std::exchange(chunk[p], place);
+            partBegin[p + 1] = place;
+        }
+        resizeLarge(index.order_, mesh.tets.size());
+        parallelForChunks(execution, count, kIndexChunk, [&](std::int64_t begin, std::int64_t end) {
+            std::array<std::uint32_t, kSortParts>& places = next[std::size_t(begin / kIndexChunk)];
+            for (std::int64_t e = begin; e < end; ++e)
+                index.order_[places[partOf[std::size_t(e)]]++] = std::int32_t(e);
+        });
+        parallelFor(execution, kSortParts, [&](std::int64_t p) {
+            static thread_local std::vector<Keyed> keys;
+            const std::span<std::int32_t> part =
+                std::span(index.order_)
+                    .subspan(partBegin[std::size_t(p)],
+                             partBegin[std::size_t(p) + 1] - partBegin[std::size_t(p)]);
+            keys.clear();
+            for (const std::int32_t e : part) keys.push_back({key(e), e});
+            std::sort(keys.begin(), keys.end());
+            for (std::size_t i = 0; i < part.size(); ++i) part[i] = keys[i].element;
+        });
     }
 
     MappedBox makeGroup(std::int64_t g) {
-        std::array<MappedBox, kWidth> boxes;
+        const std::size_t begin = std::size_t(g) * kWidth;
+        const std::size_t size = std::min<std::size_t>(kWidth, index.order_.size() - begin);
+        Node boxes;
         MappedBox all = nothing();
-        const std::size_t first = std::size_t(g) * kWidth;
-        const std::size_t size = std::min<std::size_t>(kWidth, index.order_.size() - first);
         for (std::size_t i = 0; i < size; ++i) {
-            boxes[i] = index.mapped(boxOf(mesh, index.order_[first + i]));
-            include(all, boxes[i]);
-        }
-        Group& group = index.groups_[std::size_t(g)];
-        for (std::size_t i = 0; i < kWidth; ++i) {
-            // Absent elements: low above high.
-            const std::array<std::uint8_t, 6> steps =
-                i < size ? stepsWithin(boxes[i], all) : std::array<std::uint8_t, 6>{255, 255, 255, 0, 0, 0};
+            const MappedBox box = index.mapped(boxOf(mesh, index.order_[begin + i]));
+            include(all, box);
             for (std::size_t a = 0; a < 3; ++a) {
-                group.low[a][i] = steps[a];
-                group.high[a][i] = steps[3 + a];
+                boxes.min[a][i] = box.min[a];
+                boxes.max[a][i] = box.max[a];
             }
         }
+        const GroupSteps steps(all);
+        Group& group = index.groups_[std::size_t(g)];
+        for (std::size_t a = 0; a < 3; ++a)
+            for (std::size_t i = 0; i < kWidth; ++i) {
+                // Absent elements: low above high.
+                group.low[a][i] = i < size ? steps.at(a, boxes.min[a][i]) : 255;
+                group.high[a][i] = i < size ? steps.at(a, boxes.max[a][i]) : 0;
+            }
         return all;
     }
 
     template <class BoxOf>
     std::vector<Node> makeLevel(std::int64_t children, const BoxOf& childBox) {
         const std::int64_t count = (children + kWidth - 1) / kWidth;
-        std::vector<Node> level{std::size_t(count)};
+        std::vector<Node> level;
+        resizeLarge(level, std::size_t(count));
         parallelForChunks(execution, count, kIndexChunk / kWidth, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t n = begin; n < end; ++n)
                 for (std::int64_t c = 0; c < kWidth; ++c) {
@@ -264,7 +312,7 @@ struct ElementIndex::Builder {
     void build() {
         sortElements();
         const std::int64_t groups = (mesh.elementCount() + kWidth - 1) / kWidth;
-        index.groups_.resize(std::size_t(groups));
+        resizeLarge(index.groups_, std::size_t(groups));
         index.levels_.push_back(makeLevel(groups, [&](std::int64_t g) { return makeGroup(g); }));
         while (index.levels_.back().size() > 1) {
             const std::vector<Node>& below = index.levels_.back();
@@ -340,13 +388,9 @@ ElementIndex::MappedBox ElementIndex::element(const Group& group, std::size_t i,
 }
 
 std::array<std::uint8_t, 6> ElementIndex::stepsWithin(const MappedBox& box, const MappedBox& group) {
-    std::array<std::uint8_t, 6> steps;
-    for (std::size_t a = 0; a < 3; ++a) {
-        const float perStep = stepsPer(group.max[a] - group.min[a]);
-        steps[a] = std::uint8_t(std::clamp((box.min[a] - group.min[a]) * perStep, 0.0f, 255.0f));
-        steps[3 + a] = std::uint8_t(std::clamp((box.max[a] - group.min[a]) * perStep, 0.0f, 255.0f));
-    }
-    return steps;
+    const GroupSteps steps(group);
+    return {steps.at(0, box.min[0]), steps.at(1, box.min[1]), steps.at(2, box.min[2]),
+            steps.at(0, box.max[0]), steps.at(1, box.max[1]), steps.at(2, box.max[2])};
 }
 
 std::span<const std::int32_t> ElementIndex::elementsBelow(std::size_t level, std::int64_t child) const {

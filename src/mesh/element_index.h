@@ -76,6 +76,7 @@ class ElementIndex {
         std::array<float, 3> min, max;
     };
     struct Builder;
+    struct GroupSteps;
     struct Comb;
 
     double mapped(double x, int axis) const {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "base/large_pages.h"
 #include "base/parallel.h"
 #include "raster/regions.h"
 
@@ -127,12 +128,12 @@ bool tighten(const ElementShape& shape, const Vec3i& regionMin, SliceElement& e)
 /// Nearly all elements are easy.
 void reserve(const RasterInputs& inputs, std::size_t count, std::vector<SliceElement>& elements,
              RecordList<EasyGeometry>& easy, RecordList<ThinGeometry>& thin) {
-    elements.reserve(count);
-    easy.geometry.reserve(count);
+    reserveLarge(elements, count);
+    reserveLarge(easy.geometry, count);
     easy.channels.resize(inputs.passCount());
     thin.channels.resize(inputs.passCount());
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass)
-        easy.channels[pass].reserve(count * std::size_t(inputs.recordedChannels(pass)));
+        reserveLarge(easy.channels[pass], count * std::size_t(inputs.recordedChannels(pass)));
 }
 
 void prepareChunk(const RasterInputs& inputs, const IndexBox& points, std::span<const std::int32_t> elements,

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/large_pages.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
 #include "raster/hard_elements.h"
@@ -61,7 +62,8 @@ GLuint RasterDevice::upload(GlContext& context, Stream& stream, const void* byte
     slot.read.reset();
     if (slot.buffer.bytes() < std::int64_t(count) || !slot.buffer) {
         constexpr GLbitfield kMapping = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-        const std::int64_t size = std::max<std::int64_t>(std::int64_t(count) + std::int64_t(count) / 2, 4096);
+        stream.mostBytes = std::max({stream.mostBytes, std::int64_t(count + count / 4), std::int64_t(4096)});
+        const std::int64_t size = stream.mostBytes;
         slot.buffer = GlBuffer();
         GlBuffer made(context, size, kMapping);
         slot.mapped = made.map(0, size, kMapping);
@@ -361,7 +363,7 @@ RasterImage RasterDevice::readBack(GlContext& context) {
     RasterImage image;
     image.components = channels_ == 1 ? 1 : 4;
     const auto pixels = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
-    image.codes.resize(pixels * std::size_t(image.components));
+    resizeLarge(image.codes, pixels * std::size_t(image.components));
     gl.GetTextureSubImage(target_.codes.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z,
                           image.components == 1 ? GL_RED : GL_RGBA, GL_FLOAT,
                           GLsizei(image.codes.size() * sizeof(float)), image.codes.data());

@@ -73,6 +73,8 @@ class RasterDevice {
         Vec3i size{0};  ///< s, t, layers
         GLenum format = 0;
     };
+    /// Buffers of a ring. What is filled once a region is large, and no more than two are under way.
+    static constexpr std::size_t kOfRegions = 2, kOfBatches = 4;
     /// A ring of persistently mapped buffers that grow: the processor fills one while the device reads
     /// others.
     struct Stream {
@@ -81,8 +83,10 @@ class RasterDevice {
             void* mapped = nullptr;
             GlFence read;
         };
-        std::array<Slot, 4> slots;
+        explicit Stream(std::size_t buffers) : slots(buffers) {}
+        std::vector<Slot> slots;
         std::size_t next = 0, filled = 0;
+        std::int64_t mostBytes = 0;  ///< ever filled: the next buffer that must grow takes them all
     };
 
     const GlProgram& program(GlContext& context, const Variant& variant);
@@ -107,8 +111,9 @@ class RasterDevice {
     bool countsFragments_;
     std::map<Variant, GlProgram> programs_;
     Target target_;
-    Stream easyGeometry_, easyChannels_, thinGeometry_, thinChannels_, published_, nodeCodes_, vertices_,
-        indices_;
+    Stream easyGeometry_{kOfRegions}, easyChannels_{kOfRegions}, thinGeometry_{kOfRegions},
+        thinChannels_{kOfRegions}, published_{kOfRegions}, nodeCodes_{kOfRegions};
+    Stream vertices_{kOfBatches}, indices_{kOfBatches};
     GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
     GlTexture alphaTexture_;
     std::vector<std::array<GlQuery, 2>> timers_;

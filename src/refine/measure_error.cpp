@@ -162,7 +162,8 @@ FieldError fieldReport(const SampledMesh& samples, std::size_t f, const SampleEr
     if (sums.worst.error >= 0) result.worstPlaceWorld = samples.placeWorld(sums.worst.sample, Vec3d(0));
     const double unit = errorUnit(sampled);
     result.p999 = std::min(result.max, quantile999(errors.lists[f], result, execution) * unit);
-    result.rms = sums.weights > 0 ? std::sqrt(sums.squares / sums.weights) * unit : 0;
+    const WeightedSquares& squares = sums.squares;
+    result.rms = squares.weights > 0 ? std::sqrt(squares.sum / squares.weights) * unit : 0;
     result.integralMesh = sums.integralMesh;
     if (sampled.range > 0) {
         result.relativeMax = result.max / sampled.range;

@@ -49,6 +49,12 @@ struct Batch {
     std::vector<double> exact;  // [channel * kBatch + position]
 };
 
+// Samples come near the last one, so its leaf is tried first, as long as that mostly succeeds.
+struct LastLeaf {
+    std::int32_t number = -1;
+    int credit = 8;
+};
+
 void raise(double& slot, double value) {
     std::atomic_ref<double> largest(slot);
     double old = largest.load(std::memory_order_relaxed);
@@ -67,13 +73,12 @@ class Measurement {
     std::vector<Part> measureNodes(const NodeSet& used);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
-    bool findLeaf(const Vec3d& placeWorld, std::int32_t& leaf, Vec3d& local) const;
+    bool findLeaf(const Vec3d& placeWorld, LastLeaf& last, Vec3d& local) const;
     void locate(Batch& batch) const;
     bool findCorners(std::size_t leaf, const Vec3i& cell, std::array<const float*, 8>& corner) const;
     void measureBatch(Batch& batch, Part& part);
     bool fieldErrors(const Batch& batch, std::size_t i, std::span<double> errors) const;
     void keep(std::uint32_t sample, std::int32_t leaf, std::span<const double> errors, Part& part);
-    void addWeighted(std::size_t f, std::size_t sample, double weight, FieldSums& sums) const;
     void addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const;
     double centroidWeight(const SampledField& field) const { return field.isCell() ? 1 : kCentroidWeight; }
     void measureDeferred(std::vector<Part>& parts);
@@ -158,18 +163,21 @@ bool Measurement::findCorners(std::size_t leaf, const Vec3i& cell,
     return true;
 }
 
-// The leaf that holds a place, and the place in its index space from its first point. Samples come near the
-// last one, so its leaf is tried first.
-bool Measurement::findLeaf(const Vec3d& placeWorld, std::int32_t& leaf, Vec3d& local) const {
+// The leaf that holds a place, and the place in its index space from its first point.
+bool Measurement::findLeaf(const Vec3d& placeWorld, LastLeaf& last, Vec3d& local) const {
+    std::int32_t& leaf = last.number;
     const auto localIn = [&](const LeafTiles::Leaf& in) {
         return placeWorld * in.inverseSpacing - in.firstPoint;
     };
-    if (leaf >= 0) {
+    if (leaf >= 0 && last.credit > 0) {
         const double edge = tree_.brickCells();
         local = localIn(tiles_.leaf(std::size_t(leaf)));
         if (local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < edge && local.y < edge &&
-            local.z < edge)
+            local.z < edge) {
+            ++last.credit;
             return true;
+        }
+        --last.credit;
     }
     leaf = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
     if (leaf >= 0) local = localIn(tiles_.leaf(std::size_t(leaf)));
@@ -178,7 +186,7 @@ bool Measurement::findLeaf(const Vec3d& placeWorld, std::int32_t& leaf, Vec3d& l
 
 void Measurement::locate(Batch& batch) const {
     const int brickCells = tree_.brickCells();
-    std::int32_t last = -1;
+    LastLeaf last;
     for (std::size_t i = 0; i < batch.count; ++i) {
         const Vec3d& place = batch.placeWorld[i];
         Vec3d local;
@@ -186,12 +194,12 @@ void Measurement::locate(Batch& batch) const {
         batch.leaf[i] = -1;
         if (bounds_ && !contains(*bounds_, place)) continue;
         if (!findLeaf(place, last, local)) continue;
-        batch.leaf[i] = last;
+        batch.leaf[i] = last.number;
         const CellPlace at = locateInBrick(local, brickCells);
         batch.fraction[i] = at.fraction;
-        const int low = tiles_.leaf(std::size_t(last)).firstCell;
+        const int low = tiles_.leaf(std::size_t(last.number)).firstCell;
         if (at.cell.x < low || at.cell.y < low || at.cell.z < low) continue;
-        if (!findCorners(std::size_t(last), at.cell, batch.corner[i])) continue;
+        if (!findCorners(std::size_t(last.number), at.cell, batch.corner[i])) continue;
         batch.direct[i] = true;
         // Corners 4 to 7 lie beside these along z, mostly in the same cache line.
         for (std::size_t c = 0; c < 4; ++c) __builtin_prefetch(batch.corner[i][c]);
@@ -323,35 +331,19 @@ void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& ba
     }
 }
 
-void Measurement::addWeighted(std::size_t f, std::size_t sample, double weight, FieldSums& sums) const {
-    const double error = double(lists_[f][sample]);
-    if (!(error >= 0)) return;
-    sums.squares += weight * error * error;
-    sums.weights += weight;
-}
-
-// What a batch of elements adds: their centroids and nodes, one after the other. The sums stay in registers.
+// What a batch of elements adds: their centroids and nodes, one after the other. The sum stays in registers.
 void Measurement::addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const {
     const float* errors = lists_[f].data();
     const bool isCell = samples_.fields()[f].isCell();
     const double ofCentroid = centroidWeight(samples_.fields()[f]);
-    double squares = sums.squares, weights = sums.weights;
-    const auto add = [&](std::size_t sample, double weight) {
-        // No sample, or a deferred centroid, whose weight is added when it has an error: adds 0, in place of
-        // a branch that nothing could foretell.
-        const bool isMeasured = errors[sample] >= 0;
-        const double error = isMeasured ? double(errors[sample]) : 0, share = isMeasured ? weight : 0;
-        squares += share * error * error;
-        weights += share;
-    };
+    WeightedSquares sum = sums.squares;
     for (std::size_t i = 0; i < batch.count; ++i) {
-        add(batch.sample[i], ofCentroid * batch.volume[i]);
+        sum.add(errors[batch.sample[i]], ofCentroid * batch.volume[i]);
         if (isCell) continue;
         for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
-            add(std::size_t(node), kNodeWeight * batch.volume[i]);
+            sum.add(errors[node], kNodeWeight * batch.volume[i]);
     }
-    sums.squares = squares;
-    sums.weights = weights;
+    sums.squares = sum;
 }
 
 // The nodes' errors are known by now.
@@ -403,8 +395,8 @@ void Measurement::measureDeferred(std::vector<Part>& parts) {
                 keep(all[i].sample, all[i].leaf, errors, part);
                 if (all[i].sample < samples_.nodeCount()) continue;
                 for (std::size_t f = 0; f < lists_.size(); ++f)
-                    addWeighted(f, all[i].sample, centroidWeight(samples_.fields()[f]) * all[i].volume,
-                                part.sums[f]);
+                    part.sums[f].squares.add(lists_[f][all[i].sample],
+                                             centroidWeight(samples_.fields()[f]) * all[i].volume);
             }
             advance(std::int64_t(runs[std::size_t(run) + 1] - runs[std::size_t(run)]));
         }
@@ -422,8 +414,8 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
             FieldSums& sums = result.sums[f];
             const FieldSums& more = part.sums[f];
             if (more.worst.error >= 0) sums.worst.take(more.worst.error, more.worst.sample);
-            sums.squares += more.squares;
-            sums.weights += more.weights;
+            sums.squares.sum += more.squares.sum;
+            sums.squares.weights += more.squares.weights;
             for (std::size_t k = 0; k < sums.integralMesh.size(); ++k)
                 sums.integralMesh[k] += more.integralMesh[k];
         }

@@ -21,10 +21,23 @@ struct WorstSample {
     }
 };
 
+/// Weighted squares of errors in units of the field's range.
+struct WeightedSquares {
+    double sum = 0, weights = 0;
+
+    /// No sample, or one without an error yet, adds 0, in place of a branch that nothing could foretell.
+    void add(float error, double weight) {
+        const bool isMeasured = error >= 0;
+        const double size = isMeasured ? double(error) : 0, share = isMeasured ? weight : 0;
+        sum += share * size * size;
+        weights += share;
+    }
+};
+
 /// What the samples of one field add up to.
 struct FieldSums {
     WorstSample worst;
-    double squares = 0, weights = 0;   ///< weighted squared errors (in units of the field's range), weights
+    WeightedSquares squares;
     std::vector<double> integralMesh;  ///< one a component
 };
 

@@ -1,5 +1,4 @@
 #include "contract_suite.h"
-#include "base/sanitizers.h"
 
 #include <gtest/gtest.h>
 
@@ -13,26 +12,11 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "base/sanitizers.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 
 namespace tessera::contract {
-
-namespace {
-
-#if defined(TESSERA_THREAD_SANITIZER)
-constexpr bool kIsThreadSanitized = true;
-#else
-constexpr bool kIsThreadSanitized = false;
-#endif
-#if defined(TESSERA_ADDRESS_SANITIZER)
-constexpr bool kIsAddressSanitized = true;
-#else
-constexpr bool kIsAddressSanitized = false;
-#endif
-constexpr bool kIsSanitized = kIsThreadSanitized || kIsAddressSanitized;
-
-}  // namespace
 
 double scale() {
     static const double value = [] {

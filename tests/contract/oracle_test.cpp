@@ -1,10 +1,10 @@
 #include "reference/oracle.h"
-#include "base/sanitizers.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "base/sanitizers.h"
 #include "reference/fields.h"
 #include "reference/generators.h"
 #include "reference/random.h"
@@ -12,12 +12,6 @@
 
 namespace tessera {
 namespace {
-
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-constexpr bool kIsSanitized = true;  // rationals take ten times as long
-#else
-constexpr bool kIsSanitized = false;
-#endif
 
 /// The corner of the unit cube: nodes 0, x, y, z.
 TetMesh cornerTet() {

@@ -278,11 +278,7 @@ TEST_P(Gl, APersistentMapShowsWhatTheDeviceDidBeforeTheFence) {
 }
 
 // Under a sanitizer a context takes a quarter of a second.
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-constexpr int kContexts = 10;
-#else
-constexpr int kContexts = 100;
-#endif
+constexpr int kContexts = kIsSanitized ? 10 : 100;
 
 TEST_P(Gl, AContextCanBeMadeAndEndedManyTimes) {
     const auto cycle = [&] {
@@ -301,11 +297,8 @@ TEST_P(Gl, AContextCanBeMadeAndEndedManyTimes) {
     for (int i = 0; i < kContexts; ++i) cycle();
     const std::int64_t grownBytes = residentBytes() - before;
     RecordProperty("grown_bytes", std::to_string(grownBytes));
-#ifdef TESSERA_ADDRESS_SANITIZER
-    constexpr std::int64_t kBoundBytes = 100'000'000;  // freed memory stays in quarantine
-#else
-    constexpr std::int64_t kBoundBytes = 4'000'000;
-#endif
+    // The address sanitizer keeps freed memory in quarantine.
+    constexpr std::int64_t kBoundBytes = kIsAddressSanitized ? 100'000'000 : 4'000'000;
     EXPECT_LT(grownBytes, kBoundBytes) << "a context must give its memory back";
 }
 

@@ -1,5 +1,4 @@
 #include "mesh/plane_query.h"
-#include "base/sanitizers.h"
 
 #include <gmpxx.h>
 #include <gtest/gtest.h>
@@ -9,6 +8,7 @@
 #include <limits>
 #include <set>
 
+#include "base/sanitizers.h"
 #include "mesh/sub_mesh.h"
 #include "reference/generators.h"
 #include "reference/random.h"
@@ -17,11 +17,7 @@ namespace tessera {
 namespace {
 
 /// Rationals are slow where memory is watched.
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-constexpr int kTrials = 12;
-#else
-constexpr int kTrials = 40;
-#endif
+constexpr int kTrials = kIsSanitized ? 12 : 40;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

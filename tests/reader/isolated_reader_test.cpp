@@ -1,5 +1,4 @@
 #include "reader/isolated_reader.h"
-#include "base/sanitizers.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -16,6 +15,7 @@
 #include <fstream>
 #include <thread>
 
+#include "base/sanitizers.h"
 #include "files/input_file.h"
 #include "mesh_test_tools.h"
 #include "reader/mesh_packet.h"
@@ -179,25 +179,22 @@ TEST_F(IsolatedReaderTest, ThreadsAreWithinTheMemoryLimit) {
     EXPECT_EQ(tell("threads", 1024, 3), 3);
     EXPECT_EQ(tell("threads", 40, 64), 1);
     EXPECT_LE(tell("threads", 1024, 64) * 9 * 8, 1024);
-#ifndef TESSERA_ADDRESS_SANITIZER
+    if (kIsAddressSanitized) return;
     for (const int threads : {1, 64}) {
         EXPECT_LE(tell("count-memory", 200, threads), 200);
         EXPECT_GE(tell("count-memory", 200, threads), 150);
     }
-#endif
 }
 
 TEST_F(IsolatedReaderTest, EndlessAllocationEndsAtTheMemoryLimit) {
-#ifdef TESSERA_ADDRESS_SANITIZER
-    GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
-#endif
+    if (kIsAddressSanitized)
+        GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
     EXPECT_PRED2(has, refusal("allocate", {200 << 20, 60}), "more than 200 MiB");
 }
 
 TEST_F(IsolatedReaderTest, MemoryThatTheParentMayNotUseIsABadAllocation) {
-#ifdef TESSERA_ADDRESS_SANITIZER
-    GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
-#endif
+    if (kIsAddressSanitized)
+        GTEST_SKIP() << "the address sanitizer's own address space leaves no room for a limit";
     rlimit before{};
     getrlimit(RLIMIT_AS, &before);
     const rlimit tight{rlim_t(2) << 30, before.rlim_max};

@@ -22,13 +22,6 @@
 
 namespace tessera {
 
-/// Under a sanitizer all is many times slower.
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-inline constexpr bool kIsWatched = true;
-#else
-inline constexpr bool kIsWatched = false;
-#endif
-
 inline TetMesh meshWithField(TetMesh mesh) {
     addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(5 * p.x) + p.y * p.z; });
     return mesh;

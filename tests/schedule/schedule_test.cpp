@@ -1,4 +1,3 @@
-#include "base/sanitizers.h"
 #include "schedule/brick_scheduler.h"
 
 #include <gtest/gtest.h>
@@ -6,6 +5,7 @@
 #include <random>
 #include <thread>
 
+#include "base/sanitizers.h"
 #include "schedule/random_schedule.h"
 #include "schedule/schedule_bricks.h"
 #include "software/software_resampler.h"
@@ -15,11 +15,8 @@ namespace {
 
 using Clock = BrickScheduler::Clock;
 
-#ifdef TESSERA_THREAD_SANITIZER
-#define TESSERA_ON_ONE_THREAD GTEST_SKIP() << "runs on one thread: nothing for this sanitizer to find"
-#else
-#define TESSERA_ON_ONE_THREAD static_cast<void>(0)
-#endif
+#define TESSERA_ON_ONE_THREAD \
+    if (kIsThreadSanitized) GTEST_SKIP() << "runs on one thread: nothing for this sanitizer to find"
 
 struct Bench : ScheduleBench {
     Bench(TetMesh made, const ScheduleOptions& with)
@@ -275,7 +272,7 @@ TEST(Schedule, LinearFieldsHaveNoStepBetweenLeaves) {
     BrickScheduler scheduler(mesh, fields, resampler, options, target);
     std::mt19937 random(5);
     const auto share = [&] { return std::uniform_real_distribution<double>(0, 1)(random); };
-    const int states = 10, places = asked("TESSERA_SCHEDULE_FACES", kIsWatched ? 2000 : 20'000) / states;
+    const int states = 10, places = asked("TESSERA_SCHEDULE_FACES", kIsSanitized ? 2000 : 20'000) / states;
     const NearestOnDemand nearest(mesh, 1);
     int compared = 0, acrossLevels = 0;
     for (int state = 0; state < states; ++state) {
@@ -318,7 +315,7 @@ TEST(Schedule, LinearFieldsHaveNoStepBetweenLeaves) {
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
 TEST(Schedule, EveryPublishedStateIsWhole) {
     const int seeds = asked("TESSERA_SCHEDULE_SEEDS", 3),
-              steps = asked("TESSERA_SCHEDULE_STEPS", kIsWatched ? 100 : 300);
+              steps = asked("TESSERA_SCHEDULE_STEPS", kIsSanitized ? 100 : 300);
     int cutShort = 0;
     ScheduleCounts sum;
     for (int seed = 0; seed < seeds && !HasFailure(); ++seed)
