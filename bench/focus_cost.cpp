@@ -37,7 +37,7 @@ struct Options {
     std::vector<std::string> meshPaths;
     std::vector<std::int64_t> elements{1000000};
     std::string algorithm = "software";
-    int resolution = 512, brickCells = 16, jumps = 200, threads = 2, frameMs = 8;
+    int resolution = 512, brickCells = 16, jumps = 200, places = 15, threads = 2, frameMs = 8;
     double budgetMb = 2000;
     double radius = 1.0 / 16;
 };
@@ -72,6 +72,11 @@ struct AtOnce {
 std::string figures(const std::vector<double>& ms) {
     return fmt::format("median {:.2f} ms, 99 % {:.2f}, most {:.2f}", quantile(ms, 0.5), quantile(ms, 0.99),
                        quantile(ms, 1));
+}
+
+std::string shares(const std::vector<double>& percent) {
+    return fmt::format("least {:.2f} %, median {:.2f}, most {:.2f}", quantile(percent, 0),
+                       quantile(percent, 0.5), quantile(percent, 1));
 }
 
 /// Plans of many leaves, without sampling: bricks of 8^3 cells and a spacing four times finer.
@@ -178,6 +183,22 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         100 * double(leaves) * brickPoints / uniform.voxels, 100 * offline.inMesh / uniform.inMesh,
         100 * firstMs / uniform.ms, 100 * offline.ms / uniform.ms);
 
+    // Around other places, each from nothing.
+    std::vector<double> voxelsFromNothing, timeFromNothing;
+    for (int place = 0; place < options.places; ++place) {
+        ScheduleOptions there = schedule;
+        there.refine.focus = {pointFocus(node(), radius)};
+        Watch nobody;
+        nobody.isBetter = true;
+        timer.restart();
+        BrickScheduler fresh(mesh, fields, resampler, there, nobody, execution);
+        fresh.finish(execution);
+        timeFromNothing.push_back(100 * timer.elapsedMs() / uniform.ms);
+        voxelsFromNothing.push_back(100 * double(fresh.tree().leafCount()) * brickPoints / uniform.voxels);
+    }
+    std::printf("  from nothing to rest around %d other places, over uniform: voxels %s; time %s\n",
+                options.places, shares(voxelsFromNothing).c_str(), shares(timeFromNothing).c_str());
+
     std::vector<double> better, rest, over, call;
     const std::int64_t sampledBefore = scheduler.counts().sampled;
     for (int jump = 0; jump < options.jumps; ++jump) {
@@ -229,9 +250,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     }
     shareOfRest("and the jumps");
     if (!voxelShares.empty())
-        std::printf(
-            "  voxels over uniform, at rest around these places: least %.2f %%, median %.2f, most %.2f\n",
-            quantile(voxelShares, 0), quantile(voxelShares, 0.5), quantile(voxelShares, 1));
+        std::printf("  voxels over uniform, at rest around these places: %s\n", shares(voxelShares).c_str());
     measurePlans(mesh, bounds, schedule.refine, execution);
 }
 
@@ -247,6 +266,7 @@ int main(int count, char** words) {
     arguments.add("--brick-size", options.brickCells, "cells along a brick's edge");
     arguments.add("--radius", options.radius, "share of the longest side");
     arguments.add("--jumps", options.jumps, "");
+    arguments.add("--places", options.places, "beside the first, each from nothing");
     arguments.add("--threads", options.threads, "");
     arguments.add("--frame", options.frameMs, "milliseconds of one update()");
     arguments.add("--budget", options.budgetMb, "megabytes");

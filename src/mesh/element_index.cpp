@@ -78,6 +78,14 @@ struct Meetings {
     }
 };
 
+/// One bit for each of eight bytes of 0 or 1.
+unsigned bitsOf(const std::array<std::uint8_t, 8>& bytes) {
+    static_assert(std::endian::native == std::endian::little);
+    std::uint64_t word = 0;  // the product brings them together in the last byte
+    std::memcpy(&word, bytes.data(), sizeof word);
+    return unsigned(word * 0x0102040810204080u >> 56);
+}
+
 /// One bit for each of the group's elements whose box meets the one asked for, that in the group's steps.
 template <class Group>
 unsigned metInGroup(const Group& group, const std::array<std::uint8_t, 6>& steps, std::size_t elements) {
@@ -86,10 +94,7 @@ unsigned metInGroup(const Group& group, const std::array<std::uint8_t, 6>& steps
     for (std::size_t a = 0; a < 3; ++a)
         for (std::size_t i = 0; i < met.size(); ++i)
             met[i] &= std::uint8_t((group.low[a][i] <= steps[3 + a]) & (group.high[a][i] >= steps[a]));
-    static_assert(std::endian::native == std::endian::little);
-    std::uint64_t bytes = 0;  // of 0 or 1 each: the product brings them together in the last
-    std::memcpy(&bytes, met.data(), sizeof bytes);
-    return unsigned(bytes * 0x0102040810204080u >> 56) & ((1u << elements) - 1);
+    return bitsOf(met) & ((1u << elements) - 1);
 }
 
 Box3d boxOf(const TetMesh& mesh, std::int64_t element) {
@@ -375,16 +380,20 @@ ElementIndex::MappedBox ElementIndex::child(const Node& node, std::size_t c) {
             {node.max[0][c], node.max[1][c], node.max[2][c]}};
 }
 
-ElementIndex::MappedBox ElementIndex::element(const Group& group, std::size_t i, const MappedBox& groupBox) {
-    MappedBox box = groupBox;
-    for (std::size_t a = 0; a < 3; ++a) {
-        const float low = groupBox.min[a], size = groupBox.max[a] - low, step = size * 0x1p-8f;
-        if (stepsPer(size) == 0) continue;
-        // One step more on either side stands above all rounding.
-        box.min[a] = std::max(low, low + (float(group.low[a][i]) - 1) * step);
-        box.max[a] = std::min(groupBox.max[a], low + (float(group.high[a][i]) + 2) * step);
+void ElementIndex::elementsOn(std::size_t axis, const Group& group, const MappedBox& groupBox,
+                              std::array<float, kWidth>& min, std::array<float, kWidth>& max) {
+    const float low = groupBox.min[axis], high = groupBox.max[axis], size = high - low;
+    if (stepsPer(size) == 0) {
+        min.fill(low);
+        max.fill(high);
+        return;
     }
-    return box;
+    const float step = size * 0x1p-8f;
+    for (std::size_t i = 0; i < kWidth; ++i) {
+        // One step more on either side stands above all rounding.
+        min[i] = std::max(low, low + (float(group.low[axis][i]) - 1) * step);
+        max[i] = std::min(high, low + (float(group.high[axis][i]) + 2) * step);
+    }
 }
 
 std::array<std::uint8_t, 6> ElementIndex::stepsWithin(const MappedBox& box, const MappedBox& group) {
@@ -429,11 +438,23 @@ struct ElementIndex::Comb {
         return comb;
     }
 
+    bool meets(std::size_t axis, float min, float max) const {
+        return float(std::int32_t(max * scale[axis] + high[axis])) >= min * scale[axis] + low[axis];
+    }
     bool meets(const MappedBox& box) const {
-        bool all = true;
-        for (std::size_t a = 0; a < 3; ++a)
-            all &= float(std::int32_t(box.max[a] * scale[a] + high[a])) >= box.min[a] * scale[a] + low[a];
-        return all;
+        return meets(0, box.min[0], box.max[0]) & meets(1, box.min[1], box.max[1]) &
+               meets(2, box.min[2], box.max[2]);
+    }
+    /// One bit for each of a group's elements; all are compared at once.
+    unsigned metInGroup(const Group& group, const MappedBox& groupBox) const {
+        std::array<std::uint8_t, kWidth> met;
+        met.fill(1);
+        for (std::size_t a = 0; a < 3; ++a) {
+            std::array<float, kWidth> min, max;
+            elementsOn(a, group, groupBox, min, max);
+            for (std::size_t i = 0; i < kWidth; ++i) met[i] &= std::uint8_t(meets(a, min[i], max[i]));
+        }
+        return bitsOf(met);
     }
 };
 
@@ -454,11 +475,9 @@ void ElementIndex::comb(std::size_t level, std::int64_t n, const MappedBox& box,
         }
         const Group& group = groups_[std::size_t(number)];
         const std::span<const std::int32_t> elements = elementsBelow(level, number);
-        unsigned met = metInGroup(group, stepsWithin(box, below), elements.size());
-        for (; met != 0; met &= met - 1) {
-            const auto i = std::size_t(std::countr_zero(met));
-            if (points.meets(element(group, i, below))) visit(elements[i]);
-        }
+        unsigned met = points.metInGroup(group, below) & ((1u << elements.size()) - 1);
+        if (!meeting.isInside[c]) met &= metInGroup(group, stepsWithin(box, below), elements.size());
+        for (; met != 0; met &= met - 1) visit(elements[std::size_t(std::countr_zero(met))]);
     }
 }
 

@@ -85,7 +85,9 @@ class ElementIndex {
     MappedBox mapped(const Box3d& box) const;
     Box3d unmapped(const MappedBox& box) const;
     static MappedBox child(const Node& node, std::size_t c);
-    static MappedBox element(const Group& group, std::size_t i, const MappedBox& groupBox);
+    /// The extents of a group's elements on an axis, perhaps a little enlarged.
+    static void elementsOn(std::size_t axis, const Group& group, const MappedBox& groupBox,
+                           std::array<float, kWidth>& min, std::array<float, kWidth>& max);
     /// The box in 256ths of the group's, by which its elements are compared.
     static std::array<std::uint8_t, 6> stepsWithin(const MappedBox& box, const MappedBox& group);
     /// Those below a child of a node of this level, by the child's number on the level below.
@@ -115,11 +117,14 @@ class ElementIndex {
                 continue;
             }
             const Group& group = groups_[std::size_t(below)];
+            std::array<std::array<float, kWidth>, 3> min, max;
+            for (std::size_t a = 0; a < 3; ++a) elementsOn(a, group, box, min[a], max[a]);
             for (std::size_t i = 0; i < kWidth; ++i) {
                 const std::size_t place = std::size_t(below) * kWidth + i;
                 if (place >= order_.size()) break;
                 ++looked;
-                if (meets(unmapped(element(group, i, box)))) visit(order_[place]);
+                if (meets(unmapped({{min[0][i], min[1][i], min[2][i]}, {max[0][i], max[1][i], max[2][i]}})))
+                    visit(order_[place]);
             }
         }
     }

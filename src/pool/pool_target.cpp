@@ -51,7 +51,7 @@ std::vector<PoolTarget::Touched> PoolTarget::touchedBy(const Publication& public
     for (const GrowingLeaf& leaf : publication.removed) changed.push_back(leaf.key);
     for (const ShownBrick& brick : publication.added) changed.push_back(brick.leaf.key);
     std::vector<Touched> touched;
-    for (const GrowingLeaf& leaf : publication.bordering)
+    for (const GrowingLeaf& leaf : publication.findBordering())
         for (const IndexBox& part : bricks_.touchedPoints(leaf.key, changed)) touched.push_back({leaf, part});
     return touched;
 }

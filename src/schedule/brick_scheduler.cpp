@@ -110,7 +110,7 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
                 options.archive, options.threads) {
-    constexpr std::size_t kMostReserved = 1 << 20;
+    constexpr std::size_t kMostReserved = 1 << 13;  // memory touched first costs as much as sampling
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
     replan();
     beginRoots();
@@ -311,10 +311,8 @@ void BrickScheduler::publish(const DepthKey* within, std::span<const GrowingLeaf
                              std::span<const GrowingLeaf> added) {
     std::vector<ShownBrick> shown;
     for (const GrowingLeaf& leaf : added) shown.push_back({leaf, memory_.find(leaf.key)});
-    std::vector<GrowingLeaf> bordering;
-    if (within) tree_.findNeighbours(*within, bordering);
     ++counts_.published;
-    target_.publish({removed, shown, bordering});
+    target_.publish({removed, shown, &tree_, within});
 }
 
 // Drops bricks until there is room for so many more.

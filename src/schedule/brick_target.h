@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "brick/growing_tree.h"
 #include "tessera/lattice.h"
@@ -20,8 +21,17 @@ struct ShownBrick {
 struct Publication {
     std::span<const GrowingLeaf> removed;
     std::span<const ShownBrick> added;
+    /// After the step.
+    const GrowingTree* tree = nullptr;
+    /// What was changed lies in this brick; null: all is new.
+    const DepthKey* within = nullptr;
+
     /// Leaves that stay and touch what was removed: by the seam rule their values on that border may change.
-    std::span<const GrowingLeaf> bordering;
+    std::vector<GrowingLeaf> findBordering() const {
+        std::vector<GrowingLeaf> bordering;
+        if (within) tree->findNeighbours(*within, bordering);
+        return bordering;
+    }
 };
 
 /// How far a scheduler is.

@@ -91,7 +91,7 @@ class StoredBricksTest : public testing::Test {
                              {.threads = 2});
         const auto pool = makePool();
         PoolTarget target(*pool, 2);
-        target.publish({.removed = {}, .added = stored_.bricks, .bordering = {}});
+        target.publish({.removed = {}, .added = stored_.bricks});
         ASSERT_FALSE(target.isBehind());
 
         const PoolOnDevice expected(*pool_, *pool_->state()), found(*pool, *pool->state());

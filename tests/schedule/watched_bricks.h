@@ -33,7 +33,7 @@ class WatchedBricks : public BrickTarget {
             ASSERT_TRUE(leaves.emplace(brick.leaf.slot, brick).second);
             expectFresh(brick);
         }
-        for (const GrowingLeaf& leaf : publication.bordering)
+        for (const GrowingLeaf& leaf : publication.findBordering())
             ASSERT_TRUE(leaves.contains(leaf.slot) && leaves[leaf.slot].leaf == leaf);
         // Of a brick and its children one side is removed, the other one added.
         const auto areBelow = [](const auto& keys, const DepthKey& key) {
