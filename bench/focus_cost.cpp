@@ -4,7 +4,8 @@
 // A scheduler comes to rest around a first focus. Then the focus jumps to random nodes: "better" is the time
 // until the brick that holds the node is shown one depth finer than before, with what balance asks for; "at
 // rest" until everything is. Beside that: what update() overshoots its deadline by, what a new plan costs
-// alone, and a uniform resampling at the same finest spacing. radius is a sixteenth of the longest side.
+// alone, a uniform resampling at the same finest spacing, and schedulers that come to rest around other
+// places, each from nothing. radius is a sixteenth of the longest side.
 
 #include <fmt/format.h>
 
@@ -137,12 +138,12 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     const Box3d bounds = meshBounds(mesh, execution, schedule.refine.bind.index->ifBuilt());
     const Vec3d size = bounds.size();
     const double longest = std::max({size.x, size.y, size.z}), radius = options.radius * longest;
-    Random random(1);
-    const auto node = [&] {
+    Random jumps(1), places(2);
+    const auto node = [&](Random& random) {
         const auto& tet = mesh.tets[std::size_t(random.below(int(mesh.elementCount())))];
         return mesh.points[std::size_t(tet[0])];
     };
-    schedule.refine.focus = {pointFocus(node(), radius)};
+    schedule.refine.focus = {pointFocus(node(jumps), radius)};
     schedule.budgetBytes = std::int64_t(options.budgetMb * 1e6);
     std::printf("\n%s: %lld elements, index in %.0f ms; finest spacing of %d points along the longest side\n",
                 name.c_str(), static_cast<long long>(mesh.elementCount()), indexMs, options.resolution);
@@ -187,7 +188,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     std::vector<double> voxelsFromNothing, timeFromNothing;
     for (int place = 0; place < options.places; ++place) {
         ScheduleOptions there = schedule;
-        there.refine.focus = {pointFocus(node(), radius)};
+        there.refine.focus = {pointFocus(node(places), radius)};
         Watch nobody;
         nobody.isBetter = true;
         timer.restart();
@@ -196,13 +197,14 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         timeFromNothing.push_back(100 * timer.elapsedMs() / uniform.ms);
         voxelsFromNothing.push_back(100 * double(fresh.tree().leafCount()) * brickPoints / uniform.voxels);
     }
-    std::printf("  from nothing to rest around %d other places, over uniform: voxels %s; time %s\n",
-                options.places, shares(voxelsFromNothing).c_str(), shares(timeFromNothing).c_str());
+    if (options.places > 0)
+        std::printf("  from nothing to rest around %d other places, over uniform: voxels %s; time %s\n",
+                    options.places, shares(voxelsFromNothing).c_str(), shares(timeFromNothing).c_str());
 
     std::vector<double> better, rest, over, call;
     const std::int64_t sampledBefore = scheduler.counts().sampled;
     for (int jump = 0; jump < options.jumps; ++jump) {
-        const Vec3d place = node();
+        const Vec3d place = node(jumps);
         const Depth finest = scheduler.frame().maxDepth;
         const double edge = scheduler.frame().spacingWorld(finest) * cells;
         watch.wanted = {finest, Vec3i(glm::floor((place - scheduler.frame().originWorld) / edge))};
@@ -244,7 +246,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     shareOfRest("from nothing to rest");
     std::vector<double> voxelShares;
     for (int jump = 0; jump < options.jumps; ++jump) {
-        single.setFocus({pointFocus(node(), radius)});
+        single.setFocus({pointFocus(node(jumps), radius)});
         single.finish({.threads = 1});
         voxelShares.push_back(100 * double(single.tree().leafCount()) * brickPoints / uniform.voxels);
     }

@@ -10,7 +10,7 @@ namespace tessera {
 /// and where the system has none.
 void preferLargePages(void* memory, std::size_t bytes);
 
-/// Room for `count` items, in large pages where that helps. For arrays as large as the mesh.
+/// Room for `count` items, in large pages where that helps. For arrays of megabytes.
 template <class Item>
 void reserveLarge(std::vector<Item>& items, std::size_t count) {
     if (count <= items.capacity()) return;

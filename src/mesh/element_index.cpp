@@ -46,7 +46,8 @@ std::uint64_t spread(std::uint64_t x) {
     return (x | x << 2) & 0x1249249249249249ull;
 }
 
-/// The next float below or above numbers that aren't negative; without a branch.
+/// The largest float that isn't above a number, and the smallest that isn't below: of numbers that aren't
+/// negative, without a branch.
 float roundedDown(double x) {
     const float f = float(x);
     return std::bit_cast<float>(std::bit_cast<std::int32_t>(f) - std::int32_t(double(f) > x));
@@ -213,8 +214,8 @@ struct ElementIndex::Builder {
         return first;
     }
 
-    // Memory that is touched for the first time costs more here than keys that are worked out twice, so those
-    // of one part only are kept at a time.
+    // Memory that is touched for the first time costs more here than keys that are worked out twice, so a
+    // thread keeps those of one part at a time.
     void sortElements() {
         const std::int64_t count = mesh.elementCount();
         const auto first = firstKeys();
@@ -245,12 +246,12 @@ struct ElementIndex::Builder {
                 index.order_[places[partOf[std::size_t(e)]]++] = std::int32_t(e);
         });
         parallelFor(execution, kSortParts, [&](std::int64_t p) {
-            static thread_local std::vector<Keyed> keys;
             const std::span<std::int32_t> part =
                 std::span(index.order_)
                     .subspan(partBegin[std::size_t(p)],
                              partBegin[std::size_t(p) + 1] - partBegin[std::size_t(p)]);
-            keys.clear();
+            std::vector<Keyed> keys;
+            keys.reserve(part.size());
             for (const std::int32_t e : part) keys.push_back({key(e), e});
             std::sort(keys.begin(), keys.end());
             for (std::size_t i = 0; i < part.size(); ++i) part[i] = keys[i].element;

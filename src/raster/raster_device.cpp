@@ -62,8 +62,7 @@ GLuint RasterDevice::upload(GlContext& context, Stream& stream, const void* byte
     slot.read.reset();
     if (slot.buffer.bytes() < std::int64_t(count) || !slot.buffer) {
         constexpr GLbitfield kMapping = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
-        stream.mostBytes = std::max({stream.mostBytes, std::int64_t(count + count / 4), std::int64_t(4096)});
-        const std::int64_t size = stream.mostBytes;
+        const std::int64_t size = std::max<std::int64_t>(std::int64_t(count + count / 4), 4096);
         slot.buffer = GlBuffer();
         GlBuffer made(context, size, kMapping);
         slot.mapped = made.map(0, size, kMapping);

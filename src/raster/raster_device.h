@@ -73,7 +73,8 @@ class RasterDevice {
         Vec3i size{0};  ///< s, t, layers
         GLenum format = 0;
     };
-    /// Buffers of a ring. What is filled once a region is large, and no more than two are under way.
+    /// Buffers of a ring. What is filled once a pass over a region is large, and used until
+    /// finishRegion().
     static constexpr std::size_t kOfRegions = 2, kOfBatches = 4;
     /// A ring of persistently mapped buffers that grow: the processor fills one while the device reads
     /// others.
@@ -86,7 +87,6 @@ class RasterDevice {
         explicit Stream(std::size_t buffers) : slots(buffers) {}
         std::vector<Slot> slots;
         std::size_t next = 0, filled = 0;
-        std::int64_t mostBytes = 0;  ///< ever filled: the next buffer that must grow takes them all
     };
 
     const GlProgram& program(GlContext& context, const Variant& variant);

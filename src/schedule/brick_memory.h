@@ -23,7 +23,7 @@ struct DepthKeyHash {
 /// first to be dropped.
 class BrickMemory {
   public:
-    /// Makes place for so many, so that no later call takes long for it.
+    /// Makes place for so many. When there are more, a call now and then takes milliseconds for it.
     void reserve(std::size_t bricks) { bricks_.reserve(bricks); }
     std::size_t brickCount() const { return bricks_.size(); }
     bool contains(const DepthKey& key) const { return bricks_.contains(key); }

@@ -110,7 +110,8 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
                 options.archive, options.threads) {
-    constexpr std::size_t kMostReserved = 1 << 13;  // memory touched first costs as much as sampling
+    // Memory that is touched for the first time costs as much as sampling the first bricks.
+    constexpr std::size_t kMostReserved = 1 << 15;
     memory_.reserve(std::min(budgetBricks(), kMostReserved));
     replan();
     beginRoots();

@@ -21,9 +21,9 @@ struct ShownBrick {
 struct Publication {
     std::span<const GrowingLeaf> removed;
     std::span<const ShownBrick> added;
-    /// After the step.
+    /// After the step. All of this is valid during publish() alone.
     const GrowingTree* tree = nullptr;
-    /// What was changed lies in this brick; null: all is new.
+    /// What was changed lies in this brick of the tree; null: all is new.
     const DepthKey* within = nullptr;
 
     /// Leaves that stay and touch what was removed: by the seam rule their values on that border may change.

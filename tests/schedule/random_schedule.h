@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "base/sanitizers.h"
 #include "brick_test_meshes.h"
 #include "refine/plan_frame.h"
 #include "schedule/brick_scheduler.h"

@@ -126,11 +126,8 @@ TEST_F(VdbFailureTest, FilesOfOtherProgramsGiveTheirLattice) {
     // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never
     // in a crash.
     const std::string good = readBytes(file("other.vdb"));
-#ifdef TESSERA_ADDRESS_SANITIZER  // without a limit on memory some take all the time they may
-    constexpr std::uint32_t kDamagedFiles = 6;
-#else
-    constexpr std::uint32_t kDamagedFiles = 60;
-#endif
+    // Under the address sanitizer there is no limit on memory, and some take all the time they may.
+    constexpr std::uint32_t kDamagedFiles = kIsAddressSanitized ? 6 : 60;
     for (std::uint32_t i = 0; i < kDamagedFiles; ++i) {
         std::string bad = good;
         for (std::uint32_t k = 0; k < 3; ++k)
