@@ -60,9 +60,23 @@ class Watch : public BrickTarget {
     }
     DepthKey wanted;  ///< the finest brick at the place
     Depth before;
-    bool isBetter = false;
+    bool isBetter = true;  ///< or nothing is watched for
     double betterMs = 0;
     Timer timer;
+};
+
+/// A scheduler of its own, that nothing watches, from nothing to rest.
+struct FromNothing {
+    FromNothing(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
+                const ScheduleOptions& schedule, const Execution& execution)
+        : scheduler(mesh, fields, resampler, schedule, nobody, execution) {
+        scheduler.finish(execution);
+        ms = timer.elapsedMs();
+    }
+    double ms = 0;
+    Timer timer;
+    Watch nobody;
+    BrickScheduler scheduler;
 };
 
 /// A tree that was planned and sampled at once.
@@ -189,13 +203,10 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     for (int place = 0; place < options.places; ++place) {
         ScheduleOptions there = schedule;
         there.refine.focus = {pointFocus(node(places), radius)};
-        Watch nobody;
-        nobody.isBetter = true;
-        timer.restart();
-        BrickScheduler fresh(mesh, fields, resampler, there, nobody, execution);
-        fresh.finish(execution);
-        timeFromNothing.push_back(100 * timer.elapsedMs() / uniform.ms);
-        voxelsFromNothing.push_back(100 * double(fresh.tree().leafCount()) * brickPoints / uniform.voxels);
+        const FromNothing fresh(mesh, fields, resampler, there, execution);
+        timeFromNothing.push_back(100 * fresh.ms / uniform.ms);
+        voxelsFromNothing.push_back(100 * double(fresh.scheduler.tree().leafCount()) * brickPoints /
+                                    uniform.voxels);
     }
     if (options.places > 0)
         std::printf("  from nothing to rest around %d other places, over uniform: voxels %s; time %s\n",
@@ -233,13 +244,10 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n",
         figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str());
     // On one thread all that isn't sampling is planning and bookkeeping.
-    Watch unwatched;
-    unwatched.isBetter = true;
-    timer.restart();
-    BrickScheduler single(mesh, fields, resampler, schedule, unwatched, {.threads = 1});
-    single.finish({.threads = 1});
+    FromNothing alone(mesh, fields, resampler, schedule, {.threads = 1});
+    BrickScheduler& single = alone.scheduler;
     const auto shareOfRest = [&](const char* what) {
-        const double samplingMs = single.samplingMs(), restMs = timer.elapsedMs() - samplingMs;
+        const double samplingMs = single.samplingMs(), restMs = alone.timer.elapsedMs() - samplingMs;
         std::printf("  one thread, %s: sampling %.0f ms, planning and bookkeeping %.1f ms (%.1f %% of it)\n",
                     what, samplingMs, restMs, 100 * restMs / samplingMs);
     };

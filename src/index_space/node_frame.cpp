@@ -67,10 +67,8 @@ std::array<mpq_class, 3> exactIndexFromWorld(const Lattice& lattice, const Vec3d
 NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution) {
     NodeFrame frame;
     frame.lattice = lattice;
-    reserveLarge(frame.nodes, mesh.points.size());
-    reserveLarge(frame.rough, mesh.points.size());
-    frame.nodes.resize(mesh.points.size());
-    frame.rough.resize(mesh.points.size());
+    resizeLarge(frame.nodes, mesh.points.size());
+    resizeLarge(frame.rough, mesh.points.size());
     const bool axisParallel = lattice.isAxisParallel();
     const double spacing[3] = {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z};
     parallelForChunks(execution, mesh.nodeCount(), 16384, [&](std::int64_t begin, std::int64_t end) {

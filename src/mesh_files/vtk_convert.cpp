@@ -129,8 +129,7 @@ void copyPoints(const std::string& path, vtkDataSet* data, const Execution& exec
     const vtkIdType count = data->GetNumberOfPoints();
     if (count > std::numeric_limits<std::int32_t>::max())
         throw InputError(path + ": has " + std::to_string(count) + " nodes; at most 2147483647 are possible");
-    reserveLarge(points, std::size_t(count));
-    points.resize(std::size_t(count));
+    resizeLarge(points, std::size_t(count));
     auto* set = vtkPointSet::SafeDownCast(data);
     vtkDataArray* array = set && set->GetPoints() ? set->GetPoints()->GetData() : nullptr;
     if (set && count > 0 && (!array || array->GetNumberOfComponents() != 3))
@@ -153,8 +152,7 @@ void copyPoints(const std::string& path, vtkDataSet* data, const Execution& exec
 void copyValues(vtkDataArray* array, const Execution& execution, std::vector<double>& values) {
     const vtkIdType count = array->GetNumberOfValues();
     const int components = array->GetNumberOfComponents();
-    reserveLarge(values, std::size_t(count));
-    values.resize(std::size_t(count));
+    resizeLarge(values, std::size_t(count));
     const auto copyFrom = [&](const auto* source) {
         parallelForChunks(execution, count, kConvertChunk, [&](std::int64_t begin, std::int64_t end) {
             for (std::int64_t i = begin; i < end; ++i) values[std::size_t(i)] = double(source[i]);

@@ -151,6 +151,7 @@ void RasterDevice::clear(GlContext& context) {
 
 void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                          std::size_t pass) {
+    isReady_ = false;
     axes_ = inputs.axes;
     format_ = inputs.format;
     channels_ = inputs.recordedChannels(pass);
@@ -172,6 +173,7 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
         if (pass == 0) upload(context, published_, region.published);
         upload(context, nodeCodes_, region.nodeCodes[pass]);
     }
+    isReady_ = true;
 }
 
 void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
@@ -305,6 +307,7 @@ void RasterDevice::drawPublished(GlContext& context, const PublishedList& list) 
 }
 
 void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
+    if (!isReady_) return;
     // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
     const GlFunctions& gl = context.functions();
     if (usedQueries_ == timers_.size())
@@ -323,7 +326,7 @@ void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
 }
 
 void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& points) {
-    if (points.empty()) return;
+    if (!isReady_ || points.empty()) return;
     const GlFunctions& gl = context.functions();
     if (!pointArray_) {
         pointArray_ = GlVertexArray(context);

@@ -50,10 +50,44 @@ struct Batch {
 };
 
 // Samples come near the last one, so its leaf is tried first, as long as that mostly succeeds.
-struct LastLeaf {
-    std::int32_t number = -1;
-    int credit = 8;
+class LastLeaf {
+  public:
+    LastLeaf(const BrickTree& tree, const LeafTiles& tiles)
+        : tree_(tree), tiles_(tiles), inverseSpacing0_(1.0 / tree.spacingWorld(0)) {}
+    /// The leaf that holds a place, -1 when there is none; world units from the tree's origin.
+    std::int32_t find(const Vec3d& placeWorld);
+    /// That place in the leaf's index space, from its first point.
+    Vec3d local() const { return local_; }
+
+  private:
+    bool holds(const Vec3d& placeWorld);
+
+    const BrickTree& tree_;
+    const LeafTiles& tiles_;
+    double inverseSpacing0_;  // of level 0, 1 / world units
+    std::int32_t leaf_ = -1;
+    int credit_ = 8;
+    Vec3d local_{0};
 };
+
+bool LastLeaf::holds(const Vec3d& placeWorld) {
+    const LeafTiles::Leaf& leaf = tiles_.leaf(std::size_t(leaf_));
+    const double edge = tree_.brickCells();
+    local_ = placeWorld * leaf.inverseSpacing - leaf.firstPoint;
+    return local_.x >= 0 && local_.y >= 0 && local_.z >= 0 && local_.x < edge && local_.y < edge &&
+           local_.z < edge;
+}
+
+std::int32_t LastLeaf::find(const Vec3d& placeWorld) {
+    if (leaf_ >= 0 && credit_ > 0) {
+        const bool isSame = holds(placeWorld);
+        credit_ += isSame ? 1 : -1;
+        if (isSame) return leaf_;
+    }
+    leaf_ = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
+    if (leaf_ >= 0) holds(placeWorld);
+    return leaf_;
+}
 
 void raise(double& slot, double value) {
     std::atomic_ref<double> largest(slot);
@@ -73,7 +107,6 @@ class Measurement {
     std::vector<Part> measureNodes(const NodeSet& used);
     std::vector<Part> measureElements();
     void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
-    bool findLeaf(const Vec3d& placeWorld, LastLeaf& last, Vec3d& local) const;
     void locate(Batch& batch) const;
     bool findCorners(std::size_t leaf, const Vec3i& cell, std::array<const float*, 8>& corner) const;
     void measureBatch(Batch& batch, Part& part);
@@ -94,7 +127,6 @@ class Measurement {
     const Execution& execution_;
     std::vector<double>* leafErrors_;
     std::optional<Box3d> bounds_;  // from the tree's origin
-    double inverseSpacing0_;       // of level 0, 1 / world units
     LeafTiles tiles_;
     std::vector<std::vector<float>> lists_;
     std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
@@ -110,7 +142,6 @@ Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, cons
       reconstruction_(reconstruction),
       execution_(execution),
       leafErrors_(leafErrors),
-      inverseSpacing0_(1.0 / tree.spacingWorld(0)),
       tiles_(tree, store, execution),
       lists_(samples.fields().size()) {
     for (std::vector<float>& list : lists_) {
@@ -163,43 +194,22 @@ bool Measurement::findCorners(std::size_t leaf, const Vec3i& cell,
     return true;
 }
 
-// The leaf that holds a place, and the place in its index space from its first point.
-bool Measurement::findLeaf(const Vec3d& placeWorld, LastLeaf& last, Vec3d& local) const {
-    std::int32_t& leaf = last.number;
-    const auto localIn = [&](const LeafTiles::Leaf& in) {
-        return placeWorld * in.inverseSpacing - in.firstPoint;
-    };
-    if (leaf >= 0 && last.credit > 0) {
-        const double edge = tree_.brickCells();
-        local = localIn(tiles_.leaf(std::size_t(leaf)));
-        if (local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < edge && local.y < edge &&
-            local.z < edge) {
-            ++last.credit;
-            return true;
-        }
-        --last.credit;
-    }
-    leaf = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
-    if (leaf >= 0) local = localIn(tiles_.leaf(std::size_t(leaf)));
-    return leaf >= 0;
-}
-
 void Measurement::locate(Batch& batch) const {
     const int brickCells = tree_.brickCells();
-    LastLeaf last;
+    LastLeaf last(tree_, tiles_);
     for (std::size_t i = 0; i < batch.count; ++i) {
         const Vec3d& place = batch.placeWorld[i];
-        Vec3d local;
         batch.direct[i] = false;
         batch.leaf[i] = -1;
         if (bounds_ && !contains(*bounds_, place)) continue;
-        if (!findLeaf(place, last, local)) continue;
-        batch.leaf[i] = last.number;
-        const CellPlace at = locateInBrick(local, brickCells);
+        const std::int32_t leaf = last.find(place);
+        if (leaf < 0) continue;
+        batch.leaf[i] = leaf;
+        const CellPlace at = locateInBrick(last.local(), brickCells);
         batch.fraction[i] = at.fraction;
-        const int low = tiles_.leaf(std::size_t(last.number)).firstCell;
+        const int low = tiles_.leaf(std::size_t(leaf)).firstCell;
         if (at.cell.x < low || at.cell.y < low || at.cell.z < low) continue;
-        if (!findCorners(std::size_t(last.number), at.cell, batch.corner[i])) continue;
+        if (!findCorners(std::size_t(leaf), at.cell, batch.corner[i])) continue;
         batch.direct[i] = true;
         // Corners 4 to 7 lie beside these along z, mostly in the same cache line.
         for (std::size_t c = 0; c < 4; ++c) __builtin_prefetch(batch.corner[i][c]);
@@ -414,8 +424,7 @@ void Measurement::addSums(const std::vector<Part>& parts, SampleErrors& result) 
             FieldSums& sums = result.sums[f];
             const FieldSums& more = part.sums[f];
             if (more.worst.error >= 0) sums.worst.take(more.worst.error, more.worst.sample);
-            sums.squares.sum += more.squares.sum;
-            sums.squares.weights += more.squares.weights;
+            sums.squares += more.squares;
             for (std::size_t k = 0; k < sums.integralMesh.size(); ++k)
                 sums.integralMesh[k] += more.integralMesh[k];
         }

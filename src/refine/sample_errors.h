@@ -32,6 +32,11 @@ struct WeightedSquares {
         sum += share * size * size;
         weights += share;
     }
+    WeightedSquares& operator+=(const WeightedSquares& other) {
+        sum += other.sum;
+        weights += other.weights;
+        return *this;
+    }
 };
 
 /// What the samples of one field add up to.

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "base/check.h"
 #include "brick/growing_tree.h"
 #include "tessera/lattice.h"
 
@@ -29,6 +30,7 @@ struct Publication {
     /// Leaves that stay and touch what was removed: by the seam rule their values on that border may change.
     std::vector<GrowingLeaf> findBordering() const {
         std::vector<GrowingLeaf> bordering;
+        TESSERA_CHECK(tree || !within, "a place in no tree");
         if (within) tree->findNeighbours(*within, bordering);
         return bordering;
     }
