@@ -33,6 +33,7 @@ if(TESSERA_BUILD_IO)
   find_package(nlohmann_json REQUIRED)
   find_package(CLI11 REQUIRED)
   find_package(fmt REQUIRED)
+  find_package(mimalloc 2.0 REQUIRED)
   add_library(tessera_openvdb INTERFACE IMPORTED)
   target_include_directories(tessera_openvdb SYSTEM INTERFACE ${OPENVDB_INCLUDE_DIR})
   # Members of its classes that the shared library keeps to itself must be inlined, which clang does from -O2 on.
