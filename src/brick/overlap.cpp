@@ -11,9 +11,15 @@ ElementOverlap::ElementOverlap(const std::array<Vec3d, 4>& nodes) : nodes_(nodes
 
 namespace {
 
-// Separates the corners, given relative to the box's centre, from the box of half size `half` along one axis.
-// The tolerance covers the rounding of the axis and of the projections; `reach` is how far the corners are.
-bool separates(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half, double reach) {
+/// How an element and a box lie along one axis.
+struct Shadows {
+    bool areApart;
+    bool holdCentre;  ///< the box's centre lies well within the element's shadow
+};
+
+// Of corners that are given relative to the box's centre and a box of half size `half`. The tolerance covers
+// the rounding of the axis and of the projections; `reach` is how far the corners are.
+Shadows shadowsOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half, double reach) {
     double low = glm::dot(axis, corners[0]), high = low;
     double largest = std::abs(low);
     for (int i = 1; i < 4; ++i) {
@@ -26,7 +32,7 @@ bool separates(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec
     const double radius = glm::dot(size, half);
     const double scale = std::max({largest, radius, (size.x + size.y + size.z) * reach});
     const double tolerance = 1e-12 * scale;
-    return low > radius + tolerance || high < -radius - tolerance;
+    return {low > radius + tolerance || high < -radius - tolerance, low < -tolerance && high > tolerance};
 }
 
 }  // namespace
@@ -42,17 +48,21 @@ bool ElementOverlap::touches(const Box3d& box) const {
         if (std::abs(c.x) < half.x && std::abs(c.y) < half.y && std::abs(c.z) < half.z) return true;
     const double reach = glm::length(corners[0]);
     constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    bool holdsCentre = true;
     for (const auto& f : kFaces) {
         const Vec3d normal = glm::cross(corners[std::size_t(f[1])] - corners[std::size_t(f[0])],
                                         corners[std::size_t(f[2])] - corners[std::size_t(f[0])]);
-        if (separates(normal, corners, half, reach)) return false;
+        const Shadows shadows = shadowsOn(normal, corners, half, reach);
+        if (shadows.areApart) return false;
+        holdsCentre = holdsCentre && shadows.holdCentre;
     }
+    if (holdsCentre) return true;
+    const auto separates = [&](const Vec3d& axis) { return shadowsOn(axis, corners, half, reach).areApart; };
     for (std::size_t a = 0; a < 4; ++a)
         for (std::size_t b = a + 1; b < 4; ++b) {
             const Vec3d edge = corners[b] - corners[a];
-            if (separates({0, -edge.z, edge.y}, corners, half, reach) ||
-                separates({edge.z, 0, -edge.x}, corners, half, reach) ||
-                separates({-edge.y, edge.x, 0}, corners, half, reach))
+            if (separates({0, -edge.z, edge.y}) || separates({edge.z, 0, -edge.x}) ||
+                separates({-edge.y, edge.x, 0}))
                 return false;
         }
     return true;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/check.h"
+#include "brick/depth.h"
 #include "tessera/vec.h"
 
 namespace tessera {
@@ -19,6 +20,12 @@ struct IndexHash {
         for (const int v : {index.x, index.y, index.z})
             h = (h ^ std::uint64_t(std::uint32_t(v))) * 0x9fb21c651e98df25ull, h ^= h >> 29;
         return std::size_t(h ^ (h >> 32));
+    }
+};
+
+struct DepthKeyHash {
+    std::size_t operator()(const DepthKey& key) const {
+        return IndexHash{}(key.index) * 31 + std::size_t(key.depth.halvings());
     }
 };
 

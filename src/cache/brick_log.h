@@ -6,9 +6,9 @@
 #include <string>
 #include <unordered_map>
 
+#include "brick/root_grid.h"
 #include "refine/brick_plan.h"
 #include "schedule/brick_archive.h"
-#include "schedule/brick_memory.h"
 #include "tessera/mesh.h"
 
 namespace tessera {

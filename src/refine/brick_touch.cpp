@@ -65,36 +65,37 @@ ElementOverlap overlapOf(const TetMesh& mesh, const PlanFrame& frame, std::int64
     return ElementOverlap(elementInIndexSpace(mesh, element, frame.originWorld, frame.spacingWorld(depth)));
 }
 
-BrickChildren::BrickChildren(const DepthKey& parent, const PlanFrame& frame) {
-    for (unsigned c = 0; c < 8; ++c) {
-        keys_[c] = childKey(parent, c);
-        boxes_[c] = brickTouchBox(keys_[c].index, frame.brickCells);
-        if (insideBounds(keys_[c], frame)) allowed_ = ChildBits(allowed_ | 1u << c);
-    }
+BrickChildren::BrickChildren(const DepthKey& parent, const PlanFrame& frame)
+    : parent_(parent),
+      boxes_{{brickTouchBox(key(0).index, frame.brickCells), brickTouchBox(key(7).index, frame.brickCells)}} {
+    for (unsigned c = 0; c < 8; ++c)
+        if (insideBounds(key(c), frame)) allowed_ = ChildBits(allowed_ | 1u << c);
 }
 
-ChildBits BrickChildren::touchedBy(const ElementOverlap& element) const {
+ChildBits BrickChildren::touchedBy(const ElementOverlap& element, unsigned asked) const {
     // Per axis the lower and the upper children share their bounds.
     const Box3d& own = element.bounds();
     std::array<bool, 6> touched;
     for (int a = 0; a < 3; ++a)
         for (int upper = 0; upper < 2; ++upper) {
-            const Box3d& half = boxes_[upper ? 7 : 0];
+            const Box3d& half = boxes_.halves[upper];
             touched[std::size_t(2 * a + upper)] = own.min[a] < half.max[a] && own.max[a] >= half.min[a];
         }
     unsigned bits = 0;
     for (std::size_t c = 0; c < 8; ++c)
         if ((allowed_ >> c & 1) && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
             bits |= 1u << c;
-    if (std::has_single_bit(bits)) return ChildBits(bits);
-    for (std::size_t c = 0; c < 8; ++c)
-        if ((bits >> c & 1) && !element.touches(boxes_[c])) bits &= ~(1u << c);
+    if (std::has_single_bit(bits)) return ChildBits(bits & asked);
+    bits &= asked;
+    for (unsigned c = 0; c < 8; ++c)
+        if ((bits >> c & 1) && !element.touches(boxes_.box(c))) bits &= ~(1u << c);
     return ChildBits(bits);
 }
 
 BrickPath::BrickPath(const TetMesh& mesh, const PlanFrame& frame, const BrickRange& roots,
                      const DepthKey& key)
     : mesh_(mesh), frame_(frame), roots_(roots), key_(key) {
+    above_.reserve(std::size_t(key.depth.halvings()));
     for (Depth d; d < key.depth; d = d + 1) above_.emplace_back(ancestorKey(key, d), frame);
 }
 
@@ -107,7 +108,7 @@ bool BrickPath::holds(std::int64_t element) const {
     for (std::size_t d = 0; d < above_.size(); ++d) {
         const Depth depth(int(d) + 1);
         const unsigned child = childNumber(ancestorKey(key_, depth).index);
-        if (!(above_[d].touchedBy(overlapOf(mesh_, frame_, element, depth)) >> child & 1)) return false;
+        if (above_[d].touchedBy(overlapOf(mesh_, frame_, element, depth), 1u << child) == 0) return false;
     }
     return true;
 }

@@ -8,6 +8,7 @@
 #include "brick/growing_tree.h"
 #include "brick/overlap.h"
 #include "refine/brick_plan.h"
+#include "refine/wishes.h"
 #include "tessera/mesh.h"
 
 namespace tessera {
@@ -38,15 +39,16 @@ bool touchesRoot(const ElementOverlap& element, const BrickRange& roots, const V
 class BrickChildren {
   public:
     BrickChildren(const DepthKey& parent, const PlanFrame& frame);
-    const DepthKey& key(unsigned child) const { return keys_[child]; }
+    DepthKey key(unsigned child) const { return childKey(parent_, child); }
     /// Those inside the frame's bounds.
     ChildBits allowed() const { return allowed_; }
+    /// Of the children that are asked for.
     /// @param element one that touches the parent, in index space of the children's depth.
-    ChildBits touchedBy(const ElementOverlap& element) const;
+    ChildBits touchedBy(const ElementOverlap& element, unsigned asked = 0xff) const;
 
   private:
-    std::array<DepthKey, 8> keys_;
-    std::array<Box3d, 8> boxes_;
+    DepthKey parent_;
+    ChildBoxes boxes_;
     ChildBits allowed_ = 0;
 };
 

@@ -45,12 +45,16 @@ void MeshBricks::findRoots() {
                 if (!insideBounds(key, frame_)) continue;
                 const Box3d box = boxAround(key, frame_);
                 const BrickPath path(mesh_, frame_, all, key);
-                bool isThere = false;
-                index_.walk([&](const Box3d& near) { return !isThere && meet(near, box); },
-                            [&](std::int32_t e) { isThere = isThere || path.holds(e); });
-                if (!isThere) continue;
+                std::int32_t shownBy = kNoElement;
+                index_.walk([&](const Box3d& near) { return shownBy == kNoElement && meet(near, box); },
+                            [&](std::int32_t e) {
+                                if (shownBy == kNoElement && path.holds(e)) shownBy = e;
+                            });
+                if (shownBy == kNoElement) continue;
                 roots_.push_back(root);
-                bricks_.add().key = key;
+                Brick& brick = bricks_.add();
+                brick.key = key;
+                brick.shownBy = shownBy;
             }
     rootNumbers_ = RootGrid<Number>(roots_);
     for (std::size_t r = 0; r < roots_.size(); ++r) rootNumbers_.slot(roots_[r]) = Number(r) + 1;
@@ -88,31 +92,40 @@ void MeshBricks::findChildren(Number brick) {
     for (unsigned c = 0; c < 8; ++c) boxes[c] = boxAround(children.key(c), frame_);
     unsigned missing = children.allowed();
     ChildBits there = 0;
+    std::array<std::int32_t, 8> shownBy;
     const auto mayShow = [&](const Box3d& near) {
         for (unsigned bits = missing; bits != 0; bits &= bits - 1)
             if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
         return false;
     };
     const auto show = [&](std::int32_t e) {
-        const ChildBits touched = children.touchedBy(overlapOf(mesh_, frame_, e, key.depth + 1));
-        if ((touched & missing) == 0 || !path.holds(e)) return;
+        const ChildBits touched = children.touchedBy(overlapOf(mesh_, frame_, e, key.depth + 1), missing);
+        if (touched == 0 || !path.holds(e)) return;
+        for (unsigned bits = touched; bits != 0; bits &= bits - 1)
+            shownBy[std::size_t(std::countr_zero(bits))] = e;
         there = ChildBits(there | touched);
         missing &= ~unsigned(touched);
     };
-    // Those around the middle of a child come first: they are few, and mostly enough.
-    for (unsigned c = 0; c < 8; ++c) {
-        if (!(missing >> c & 1)) continue;
-        const Vec3d middle = (boxes[c].min + boxes[c].max) * 0.5;
+    // The one that showed the brick may be as large, and those around the middle of a child are few.
+    show(bricks_[brick].shownBy);
+    const auto showAround = [&](const Box3d& box, unsigned wanted) {
+        if ((missing & wanted) == 0) return;
+        const Vec3d middle = (box.min + box.max) * 0.5;
         found_.clear();
         index_.query({middle, middle}, found_);
         for (const std::int32_t e : found_)
-            if (missing >> c & 1) show(e);
-    }
+            if ((missing & wanted) != 0) show(e);
+    };
+    showAround(boxAround(key, frame_), 0xff);
+    for (unsigned c = 0; c < 8; ++c) showAround(boxes[c], 1u << c);
     if (missing != 0) index_.walk(mayShow, show);
     const std::size_t first = bricks_.size();
     TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
     bricks_.grow(first + 8);
-    for (unsigned c = 0; c < 8; ++c) bricks_[first + c].key = children.key(c);
+    for (unsigned c = 0; c < 8; ++c) {
+        bricks_[first + c].key = children.key(c);
+        if (there >> c & 1) bricks_[first + c].shownBy = shownBy[c];
+    }
     bricks_[brick].firstChild = Number(first);
     bricks_[brick].children = there;
 }

@@ -72,6 +72,7 @@ class MeshBricks {
     const ValueMask& values(Number brick, const BrickInspector& inspector);
 
   private:
+    static constexpr std::int32_t kNoElement = -1;
     struct NearParents {
         std::array<Number, 7> numbers;
         unsigned count = 0;
@@ -82,6 +83,7 @@ class MeshBricks {
         Number firstChild = 0;   ///< 0: not looked for yet
         Number nearParents = 0;  ///< likewise; one more than the place in nearParents_
         ChildBits children = 0;
+        std::int32_t shownBy = kNoElement;  ///< an element that touches it
         std::int32_t elementsNear = -1;  ///< -1: not counted yet
         float wishedByElementSize = -1;  ///< -1: not looked for yet
         std::unique_ptr<const BrickFindings> findings;

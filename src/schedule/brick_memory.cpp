@@ -6,31 +6,40 @@
 
 namespace tessera {
 
-std::shared_ptr<const Block> BrickMemory::find(const DepthKey& key) const {
-    const auto found = bricks_.find(key);
-    return found == bricks_.end() ? nullptr : found->second.samples;
+void BrickMemory::add(Number brick, std::shared_ptr<const Block> samples) {
+    if (brick >= entries_.size()) entries_.grow(brick + std::size_t(1));
+    Entry& entry = entries_[brick];
+    TESSERA_CHECK(!entry.samples, "a brick was sampled twice");
+    entry.samples = std::move(samples);
+    entry.holds = 1;
+    ++count_;
 }
 
-void BrickMemory::add(const DepthKey& key, std::shared_ptr<const Block> samples) {
-    const auto [place, isNew] = bricks_.try_emplace(key, Entry{std::move(samples), 1, {}});
-    TESSERA_CHECK(isNew, "a brick was sampled twice");
+void BrickMemory::hold(Number brick) {
+    Entry& entry = entries_[brick];
+    if (entry.holds++ == 0) unlink(entry);
 }
 
-void BrickMemory::hold(const DepthKey& key) {
-    Entry& entry = bricks_.at(key);
-    if (entry.holds++ == 0) loose_.erase(entry.place);
-}
-
-void BrickMemory::release(const DepthKey& key) {
-    Entry& entry = bricks_.at(key);
+void BrickMemory::release(Number brick) {
+    Entry& entry = entries_[brick];
     TESSERA_CHECK(entry.holds > 0, "a brick was let go that nobody holds");
-    if (--entry.holds == 0) entry.place = loose_.insert(loose_.end(), key);
+    if (--entry.holds > 0) return;
+    entry.before = std::exchange(newest_, brick);
+    entry.after = kNone;
+    (entry.before == kNone ? oldest_ : entries_[entry.before].after) = brick;
+}
+
+void BrickMemory::unlink(const Entry& entry) {
+    (entry.before == kNone ? oldest_ : entries_[entry.before].after) = entry.after;
+    (entry.after == kNone ? newest_ : entries_[entry.after].before) = entry.before;
 }
 
 bool BrickMemory::dropOldest() {
-    if (loose_.empty()) return false;
-    bricks_.erase(loose_.front());
-    loose_.pop_front();
+    if (oldest_ == kNone) return false;
+    Entry& entry = entries_[oldest_];
+    unlink(entry);
+    entry.samples.reset();
+    --count_;
     return true;
 }
 

@@ -1,41 +1,33 @@
 #pragma once
 
 #include <cstddef>
-#include <list>
 #include <memory>
-#include <optional>
-#include <unordered_map>
-#include <vector>
 
-#include "brick/depth.h"
-#include "brick/root_grid.h"
+#include "refine/mesh_bricks.h"
+#include "refine/steady_vector.h"
 #include "tessera/lattice.h"
 
 namespace tessera {
 
-struct DepthKeyHash {
-    std::size_t operator()(const DepthKey& key) const {
-        return IndexHash{}(key.index) * 31 + std::size_t(key.depth.halvings());
-    }
-};
-
-/// Sampled bricks in memory. Those that are held stay; of the others the one that was let go first is the
-/// first to be dropped.
+/// Sampled bricks in memory, by their numbers. Those that are held stay; of the others the one that was let
+/// go first is the first to be dropped.
 class BrickMemory {
   public:
-    /// Makes place for so many. When there are more, a call now and then takes milliseconds for it.
-    void reserve(std::size_t bricks) { bricks_.reserve(bricks); }
-    std::size_t brickCount() const { return bricks_.size(); }
-    bool contains(const DepthKey& key) const { return bricks_.contains(key); }
+    using Number = MeshBricks::Number;
+
+    std::size_t brickCount() const { return count_; }
+    bool contains(Number brick) const { return find(brick) != nullptr; }
     /// Null when it isn't there.
-    std::shared_ptr<const Block> find(const DepthKey& key) const;
+    std::shared_ptr<const Block> find(Number brick) const {
+        return brick < entries_.size() ? entries_[brick].samples : nullptr;
+    }
 
     /// Adds a brick that isn't there yet, held once.
-    void add(const DepthKey& key, std::shared_ptr<const Block> samples);
+    void add(Number brick, std::shared_ptr<const Block> samples);
     /// Holds a brick that is there, once more.
-    void hold(const DepthKey& key);
+    void hold(Number brick);
     /// Lets go of a brick once.
-    void release(const DepthKey& key);
+    void release(Number brick);
     /// Drops a brick that nobody holds; false when there is none.
     bool dropOldest();
     /// All that nobody holds.
@@ -45,13 +37,17 @@ class BrickMemory {
     }
 
   private:
+    static constexpr Number kNone = ~Number(0);
     struct Entry {
         std::shared_ptr<const Block> samples;
         int holds = 0;
-        std::list<DepthKey>::iterator place;  ///< in loose_, where nobody holds it
+        Number before = kNone, after = kNone;  ///< let go before and after it, where nobody holds it
     };
-    std::unordered_map<DepthKey, Entry, DepthKeyHash> bricks_;
-    std::list<DepthKey> loose_;  ///< the one let go first is the first
+    void unlink(const Entry& entry);
+
+    SteadyVector<Entry> entries_;
+    std::size_t count_ = 0;
+    Number oldest_ = kNone, newest_ = kNone;  ///< of those that nobody holds
 };
 
 }  // namespace tessera

@@ -81,13 +81,6 @@ Wishes firstWishes(const TetMesh& mesh, std::span<const int> fields, const Sched
     return wishes;
 }
 
-std::vector<DepthKey> childrenOf(const DepthKey& key, ChildBits children) {
-    std::vector<DepthKey> keys;
-    for (unsigned bits = children; bits != 0; bits &= bits - 1)
-        keys.push_back(childKey(key, unsigned(std::countr_zero(bits))));
-    return keys;
-}
-
 }  // namespace
 
 std::int64_t bytesOfBrick(int channels, int brickCells) {
@@ -110,9 +103,6 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
                 options.archive, options.threads) {
-    // Memory that is touched for the first time costs as much as sampling the first bricks.
-    constexpr std::size_t kMostReserved = 1 << 15;
-    memory_.reserve(std::min(budgetBricks(), kMostReserved));
     replan();
     beginRoots();
 }
@@ -194,16 +184,16 @@ void BrickScheduler::abandon(const Change& change) {
         sampling_.drop(*change.order);
         reserved_ -= change.missing;
     }
-    for (const DepthKey& key : change.bricks)
-        if (memory_.contains(key)) memory_.release(key);
+    for (const MeshBricks::Number brick : change.bricks)
+        if (memory_.contains(brick)) memory_.release(brick);
 }
 
 void BrickScheduler::beginRoots() {
     Change roots;
     std::vector<std::vector<DepthKey>> each;
     for (const Vec3i& root : bricks_.roots()) {
-        roots.bricks.push_back({Depth(0), root});
-        each.push_back({roots.bricks.back()});
+        roots.bricks.push_back(MeshBricks::Number(roots.bricks.size()));
+        each.push_back({{Depth(0), root}});
     }
     roots.missing = each.size();
     reserved_ += each.size();
@@ -214,18 +204,22 @@ void BrickScheduler::beginRoots() {
 // False when there is no room.
 bool BrickScheduler::beginChange(const WishPlan::Split& split) {
     Change change;
-    change.split = bricks_.key(split.brick);
+    change.split = split.brick;
     change.planNumber = planNumber_;
     change.children = split.children;
-    change.bricks = childrenOf(*change.split, split.children);
     // Two orders that wait for one brick would sample it twice.
     std::vector<std::vector<DepthKey>> halves(2);
-    for (const DepthKey& key : change.bricks)
-        if (!memory_.contains(key)) halves[std::size_t(key.index.z & 1)].push_back(key);
+    for (unsigned bits = split.children; bits != 0; bits &= bits - 1) {
+        const MeshBricks::Number child = bricks_.child(split.brick, unsigned(std::countr_zero(bits)));
+        change.bricks.push_back(child);
+        const DepthKey& key = bricks_.key(child);
+        // What is there already must stay while room is made.
+        if (memory_.contains(child))
+            memory_.hold(child);
+        else
+            halves[std::size_t(key.index.z & 1)].push_back(key);
+    }
     const std::size_t missing = halves[0].size() + halves[1].size();
-    // What is there already must stay while room is made.
-    for (const DepthKey& key : change.bricks)
-        if (memory_.contains(key)) memory_.hold(key);
     change.missing = missing;
     if (!makeRoom(missing)) {
         change.missing = 0;
@@ -246,11 +240,10 @@ bool BrickScheduler::fillQueue(Clock::time_point deadline) {
     while (changes_.size() < kAtOnce && hasRoots_) {
         if (!next_) next_ = plan_->next();
         if (!next_) return !plan_->waitsFor().empty();
-        const DepthKey key = bricks_.key(next_->brick);
         // An older plan's change will be shown, or prove to have lost what it stands on: then it is begun
         // anew.
         if (std::any_of(changes_.begin(), changes_.end(),
-                        [&](const Change& change) { return change.split == key; }))
+                        [&](const Change& change) { return change.split == next_->brick; }))
             return true;
         if (!isSplit(next_->brick) && !beginChange(*next_)) return true;
         next_.reset();
@@ -265,8 +258,9 @@ bool BrickScheduler::publishFinished() {
         Change change = std::move(changes_.front());
         changes_.pop_front();
         for (SampledBrick& brick : sampling_.take(*change.order)) {
-            memory_.add(brick.key, std::move(brick.samples));
-            if (brick.findings) bricks_.setFindings(*bricks_.find(brick.key), std::move(*brick.findings));
+            const MeshBricks::Number number = numberOf(change.split, brick.key);
+            memory_.add(number, std::move(brick.samples));
+            if (brick.findings) bricks_.setFindings(number, std::move(*brick.findings));
             ++(brick.wasRead ? counts_.read : counts_.sampled);
         }
         reserved_ -= change.missing;
@@ -281,39 +275,47 @@ void BrickScheduler::show(const Change& change) {
         // An older plan's change may have lost what it stands on.
         if (showSplit(change)) return;
         TESSERA_CHECK(change.planNumber < planNumber_, "a plan's change can't be shown");
-        for (const DepthKey& key : change.bricks) memory_.release(key);
+        for (const MeshBricks::Number brick : change.bricks) memory_.release(brick);
         return;
     }
     tree_ = GrowingTree(bricks_.roots());
     hasRoots_ = true;
     const std::vector<GrowingLeaf> leaves = tree_.leaves();
-    publish(nullptr, {}, leaves);
+    publish({}, {}, leaves);
 }
 
 bool BrickScheduler::showSplit(const Change& change) {
     struct Unbalanced {};
-    if (!tree_.findLeaf(*change.split)) return false;
+    const DepthKey& key = bricks_.key(*change.split);
+    if (!tree_.findLeaf(key)) return false;
     bool isFirst = true;
     try {
-        tree_.split(*change.split, [&](std::span<const GrowingLeaf>, std::span<ChildBits> children) {
+        tree_.split(key, [&](std::span<const GrowingLeaf>, std::span<ChildBits> children) {
             if (!std::exchange(isFirst, false)) throw Unbalanced{};
             children[0] = change.children;
         });
     } catch (const Unbalanced&) {
         return false;
     }
-    setSplit(*bricks_.find(*change.split), true);
-    publish(&*change.split, tree_.change().removed, tree_.change().added);
+    setSplit(*change.split, true);
+    publish(change.split, tree_.change().removed, tree_.change().added);
     return true;
 }
 
 // Tells the target what the tree has changed within a brick; without one, all is new.
-void BrickScheduler::publish(const DepthKey* within, std::span<const GrowingLeaf> removed,
+void BrickScheduler::publish(std::optional<MeshBricks::Number> within, std::span<const GrowingLeaf> removed,
                              std::span<const GrowingLeaf> added) {
     std::vector<ShownBrick> shown;
-    for (const GrowingLeaf& leaf : added) shown.push_back({leaf, memory_.find(leaf.key)});
+    for (const GrowingLeaf& leaf : added) shown.push_back({leaf, memory_.find(numberOf(within, leaf.key))});
     ++counts_.published;
-    target_.publish({removed, shown, &tree_, within});
+    target_.publish({removed, shown, &tree_, within ? &bricks_.key(*within) : nullptr});
+}
+
+// Of a brick, or of one of its children; without one, of any that was looked at.
+MeshBricks::Number BrickScheduler::numberOf(std::optional<MeshBricks::Number> within,
+                                            const DepthKey& key) const {
+    if (!within) return *bricks_.find(key);
+    return key == bricks_.key(*within) ? *within : bricks_.child(*within, childNumber(key.index));
 }
 
 // Drops bricks until there is room for so many more.
@@ -365,8 +367,8 @@ bool BrickScheduler::merge(MeshBricks::Number brick) {
     if (!tree_.merge(key)) return false;
     setSplit(brick, false);
     const TreeChange change = tree_.change();
-    for (const GrowingLeaf& leaf : change.removed) memory_.release(leaf.key);
-    publish(&key, change.removed, change.added);
+    for (const GrowingLeaf& leaf : change.removed) memory_.release(numberOf(brick, leaf.key));
+    publish(brick, change.removed, change.added);
     return true;
 }
 
@@ -408,7 +410,7 @@ void BrickScheduler::finish(const Execution& execution) {
 }
 
 std::shared_ptr<const Block> BrickScheduler::samples(const DepthKey& key) const {
-    return tree_.findLeaf(key) || tree_.isSplit(key) ? memory_.find(key) : nullptr;
+    return tree_.findLeaf(key) || tree_.isSplit(key) ? memory_.find(*bricks_.find(key)) : nullptr;
 }
 
 void BrickScheduler::forget() {

@@ -129,9 +129,9 @@ class BrickScheduler {
   private:
     /// Bricks that are sampled, to be shown together.
     struct Change {
-        std::optional<DepthKey> split;  ///< null: the roots
+        std::optional<MeshBricks::Number> split;  ///< null: the roots
         ChildBits children = 0;
-        std::vector<DepthKey> bricks;
+        std::vector<MeshBricks::Number> bricks;
         std::shared_ptr<BrickSampling::Order> order;
         std::size_t missing = 0;  ///< bricks that are being sampled
         int planNumber = 0;
@@ -151,8 +151,9 @@ class BrickScheduler {
     bool merge(MeshBricks::Number brick);
     bool isSplit(MeshBricks::Number brick) const { return brick < isSplit_.size() && isSplit_[brick]; }
     void setSplit(MeshBricks::Number brick, bool isSplit);
-    void publish(const DepthKey* within, std::span<const GrowingLeaf> removed,
+    void publish(std::optional<MeshBricks::Number> within, std::span<const GrowingLeaf> removed,
                  std::span<const GrowingLeaf> added);
+    MeshBricks::Number numberOf(std::optional<MeshBricks::Number> within, const DepthKey& key) const;
     std::size_t budgetBricks() const { return std::size_t(budgetBytes_ / brickBytes_); }
     PlanLimit limit() const;
 

@@ -11,6 +11,7 @@
 #include "base/timer.h"
 #include "brick/kept_points.h"
 #include "brick/leaf_tiles.h"
+#include "brick/root_grid.h"
 #include "refine/measure_error.h"
 #include "refine/plan_frame.h"
 #include "refine/refine.h"
