@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Voxels that bricks refined by error take, against a uniform lattice within the same bound, and those of
-combined criteria against the sum of the single ones. Prints two tables in Markdown.
+combined criteria against the sum of the single ones. Prints two tables in Markdown. With --focus another one
+instead: bricks around a focus against uniform ones at the same finest spacing, voxels and time.
 
-adaptive_voxels.py --programs build/release mesh:field[:x,y,z] ... [--bounds 5,2,1]
+adaptive_voxels.py --programs build/release mesh:field[:x,y,z] ... [--bounds 5,2,1] [--focus 512,1024]
 
 x, y, z is the place that is refined by focus; the middle of the mesh's bounds where it isn't given. Its
-radius is a sixteenth of the longest side, its finest spacing, for all criteria, that of 1024 points along it.
+radius is a sixteenth of the longest side, its finest spacing, for all criteria, that of 1024 points along it,
+or of as many as --focus says.
 """
 
 import argparse
@@ -51,15 +53,35 @@ def print_against_uniform(programs, meshes, bounds):
                   flush=True)
 
 
+def focus_options(programs, mesh, place):
+    low, high = tessera(programs, "info", mesh)["mesh"]["bounds"]
+    longest = max(b - a for a, b in zip(low, high))
+    place = place or ",".join(str((a + b) / 2) for a, b in zip(low, high))
+    return ["--focus", place, "--radius", str(longest / 16)]
+
+
+def print_focus(programs, meshes, resolutions):
+    """Times are those of planning, sampling and writing."""
+    print("| mesh, field | points | uniform | | around a focus | | voxels | time |")
+    print("|---|---:|---:|---:|---:|---:|---:|---:|")
+    for mesh, field, place in meshes:
+        focus = focus_options(programs, mesh, place)
+        for points in resolutions:
+            runs = [tessera(programs, "resample", mesh, "--field", field, "--resolution", points, "--max-voxels", "2G",
+                            "--refine", *criterion) for criterion in (["uniform"], ["focus", *focus])]
+            voxels = [run["voxels"]["total"] for run in runs]
+            ms = [sum(run["stages"][stage] for stage in ("plan", "resample", "write")) for run in runs]
+            sides = " | ".join(f"{v / 1e6:.3g} M | {t / 1000:.3g} s" for v, t in zip(voxels, ms))
+            print(f"| {os.path.basename(mesh)}, {field} | {points} | {sides} | {100 * voxels[1] / voxels[0]:.2f} % | "
+                  f"{100 * ms[1] / ms[0]:.1f} % |", flush=True)
+
+
 def print_combined(programs, meshes, bound):
     print("\n| mesh, field | element size | error | focus | size + error | size + focus | error + focus | all |")
     print("|---|---:|---:|---:|---:|---:|---:|---:|")
     for mesh, field, place in meshes:
-        low, high = tessera(programs, "info", mesh)["mesh"]["bounds"]
-        longest = max(b - a for a, b in zip(low, high))
-        place = place or ",".join(str((a + b) / 2) for a, b in zip(low, high))
         options = {"element-size": [], "error": ["--max-error", f"{bound}%"],
-                   "focus": ["--focus", place, "--radius", str(longest / 16)]}
+                   "focus": focus_options(programs, mesh, place)}
 
         def voxels(*criteria):
             words = [word for criterion in criteria for word in options[criterion]]
@@ -81,9 +103,12 @@ def main():
     parser.add_argument("meshes", nargs="+", metavar="mesh:field[:x,y,z]")
     parser.add_argument("--programs", default="build/release", help="folder of the build")
     parser.add_argument("--bounds", default="5,2,1", help="on the error, per cent of the field's range")
+    parser.add_argument("--focus", help="points along the longest side, several by commas")
     arguments = parser.parse_args()
     bounds = [float(bound) for bound in arguments.bounds.split(",")]
     meshes = [tuple((mesh.split(":") + [""])[:3]) for mesh in arguments.meshes]
+    if arguments.focus:
+        return print_focus(arguments.programs, meshes, arguments.focus.split(","))
     print_against_uniform(arguments.programs, meshes, bounds)
     print_combined(arguments.programs, meshes, bounds[0])
 

@@ -65,17 +65,20 @@ class Watch : public BrickTarget {
     Timer timer;
 };
 
-/// A scheduler of its own, that nothing watches, from nothing to rest.
+/// A scheduler from nothing to rest.
 struct FromNothing {
     FromNothing(const TetMesh& mesh, std::span<const int> fields, const Resampler& resampler,
                 const ScheduleOptions& schedule, const Execution& execution)
-        : scheduler(mesh, fields, resampler, schedule, nobody, execution) {
+        : scheduler(mesh, fields, resampler, schedule, watch, execution) {
         scheduler.finish(execution);
         ms = timer.elapsedMs();
     }
+    double voxels() const {
+        return double(scheduler.tree().leafCount()) * std::pow(scheduler.frame().brickCells, 3);
+    }
     double ms = 0;
     Timer timer;
-    Watch nobody;
+    Watch watch;
     BrickScheduler scheduler;
 };
 
@@ -161,17 +164,13 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     schedule.budgetBytes = std::int64_t(options.budgetMb * 1e6);
     std::printf("\n%s: %lld elements, index in %.0f ms; finest spacing of %d points along the longest side\n",
                 name.c_str(), static_cast<long long>(mesh.elementCount()), indexMs, options.resolution);
-    Watch watch;
-    timer.restart();
-    BrickScheduler scheduler(mesh, fields, resampler, schedule, watch, execution);
-    scheduler.finish(execution);
-    const double firstMs = timer.restart();
-    const std::int64_t leaves = std::int64_t(scheduler.tree().leafCount());
+    FromNothing first(mesh, fields, resampler, schedule, execution);
+    BrickScheduler& scheduler = first.scheduler;
+    Watch& watch = first.watch;
+    const double firstVoxels = first.voxels();
     const int cells = scheduler.frame().brickCells;
-    const double brickPoints = std::pow(cells, 3);
-    std::printf("  from nothing to rest: %.0f ms, %lld leaves, %.3g voxels, %.0f MB\n", firstMs,
-                static_cast<long long>(leaves), double(leaves) * brickPoints,
-                double(scheduler.bytes()) / 1e6);
+    std::printf("  from nothing to rest: %.0f ms, %zu leaves, %.3g voxels, %.0f MB\n", first.ms,
+                scheduler.tree().leafCount(), firstVoxels, double(scheduler.bytes()) / 1e6);
 
     // The same without ways to stop: the tree at once.
     RefineOptions refine = schedule.refine;
@@ -184,7 +183,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         const auto bound = resampler.bind(mesh, fields, refine.bind);
         ResampleStatistics statistics;
         const BrickStore store = resampleTree(tree, *bound, channels, execution, statistics);
-        AtOnce made{timer.elapsedMs() + planMs, double(tree.leafCount()) * brickPoints,
+        AtOnce made{timer.elapsedMs() + planMs, double(tree.leafCount()) * std::pow(cells, 3),
                     double(store.coveredPoints())};
         std::printf("  %s: plan %.0f ms, samples %.0f ms, %.3g voxels, %.3g of them in the mesh\n",
                     criterion == Criterion::uniform ? "uniform" : "focus, offline", planMs, made.ms - planMs,
@@ -195,8 +194,8 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     std::printf(
         "  over uniform: %.2f %% of the voxels, %.2f %% of those in the mesh; from nothing to rest %.1f %% "
         "of the time, offline %.1f %%\n",
-        100 * double(leaves) * brickPoints / uniform.voxels, 100 * offline.inMesh / uniform.inMesh,
-        100 * firstMs / uniform.ms, 100 * offline.ms / uniform.ms);
+        100 * firstVoxels / uniform.voxels, 100 * offline.inMesh / uniform.inMesh,
+        100 * first.ms / uniform.ms, 100 * offline.ms / uniform.ms);
 
     // Around other places, each from nothing.
     std::vector<double> voxelsFromNothing, timeFromNothing;
@@ -205,14 +204,13 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         there.refine.focus = {pointFocus(node(places), radius)};
         const FromNothing fresh(mesh, fields, resampler, there, execution);
         timeFromNothing.push_back(100 * fresh.ms / uniform.ms);
-        voxelsFromNothing.push_back(100 * double(fresh.scheduler.tree().leafCount()) * brickPoints /
-                                    uniform.voxels);
+        voxelsFromNothing.push_back(100 * fresh.voxels() / uniform.voxels);
     }
     if (options.places > 0)
         std::printf("  from nothing to rest around %d other places, over uniform: voxels %s; time %s\n",
                     options.places, shares(voxelsFromNothing).c_str(), shares(timeFromNothing).c_str());
 
-    std::vector<double> better, rest, over, call;
+    std::vector<double> better, rest, late, cut, call;
     const std::int64_t sampledBefore = scheduler.counts().sampled;
     for (int jump = 0; jump < options.jumps; ++jump) {
         const Vec3d place = node(jumps);
@@ -229,8 +227,10 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         while (true) {
             const auto deadline = Clock::now() + std::chrono::milliseconds(options.frameMs);
             const bool atRest = scheduler.update(deadline, execution);
+            const double ms = std::chrono::duration<double, std::milli>(Clock::now() - deadline).count();
+            late.push_back(std::max(ms, 0.0));
             if (atRest) break;
-            over.push_back(std::chrono::duration<double, std::milli>(Clock::now() - deadline).count());
+            cut.push_back(ms);
         }
         rest.push_back(watch.timer.elapsedMs());
         if (canImprove && watch.isBetter) better.push_back(watch.betterMs);
@@ -241,8 +241,11 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
         options.jumps, better.size(), static_cast<long long>(counts.sampled - sampledBefore),
         static_cast<long long>(counts.reused), static_cast<long long>(counts.dropped));
     std::printf(
-        "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    update() past its deadline: %s\n",
-        figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), figures(over).c_str());
+        "    better: %s\n    at rest: %s\n    call of setFocus(): %s\n    past its deadline update() ends, "
+        "of %zu "
+        "calls: %s\n      of the %zu with work left: %s\n",
+        figures(better).c_str(), figures(rest).c_str(), figures(call).c_str(), late.size(),
+        figures(late).c_str(), cut.size(), figures(cut).c_str());
     // On one thread all that isn't sampling is planning and bookkeeping.
     FromNothing alone(mesh, fields, resampler, schedule, {.threads = 1});
     BrickScheduler& single = alone.scheduler;
@@ -256,7 +259,7 @@ void measure(const Options& options, const std::string& name, const TetMesh& mes
     for (int jump = 0; jump < options.jumps; ++jump) {
         single.setFocus({pointFocus(node(jumps), radius)});
         single.finish({.threads = 1});
-        voxelShares.push_back(100 * double(single.tree().leafCount()) * brickPoints / uniform.voxels);
+        voxelShares.push_back(100 * alone.voxels() / uniform.voxels);
     }
     shareOfRest("and the jumps");
     if (!voxelShares.empty())

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "base/timer.h"
 #include "job/field_selection.h"
@@ -239,6 +240,12 @@ bool Verification::holds() const {
 
 Verification verifyFile(const VerifyRequest& request, Job& job) {
     checkOutputPaths({request.meshPath, request.vdbPath}, {{"--json", job.reportPath}});
+    const auto isVdb = [](const std::string& path) {
+        return std::filesystem::path(path).extension() == ".vdb";
+    };
+    if (isVdb(request.meshPath) && !isVdb(request.vdbPath))
+        throw InputError(request.meshPath +
+                         " is given as the mesh: the mesh comes first, then the .vdb file");
     job.execution.declare({{Stage::reading, 1}, {Stage::measuring, 1}, {Stage::comparing, 1}});
     VdbFile file = readVdb(request.vdbPath);
     ReadOptions options;

@@ -151,6 +151,8 @@ void RasterDevice::clear(GlContext& context) {
 
 void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                          std::size_t pass) {
+    // Geometry stays where the first pass put it.
+    const bool hasGeometry = pass == 0 || isReady_;
     isReady_ = false;
     axes_ = inputs.axes;
     format_ = inputs.format;
@@ -160,7 +162,6 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
     size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
     prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0));
     clear(context);
-    // Geometry stays where the first pass put it.
     if (!region.easy.geometry.empty()) {
         if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
         upload(context, easyChannels_, region.easy.channels[pass]);
@@ -173,7 +174,7 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
         if (pass == 0) upload(context, published_, region.published);
         upload(context, nodeCodes_, region.nodeCodes[pass]);
     }
-    isReady_ = true;
+    isReady_ = hasGeometry;
 }
 
 void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,

@@ -126,7 +126,8 @@ class RasterDevice {
     Vec3i size_{0};  ///< s, t, layers
     int channels_ = 1;
     SampleFormat format_ = SampleFormat::r32f;
-    bool isReady_ = false;  ///< begin() came to its end; else draws, which nobody will see, do nothing
+    bool isReady_ = false;  ///< begin() of all passes so far came to its end; else draws, which nobody will
+                            ///< see, do nothing
 };
 
 /// The process's device on a platform, made when first asked for; lives until the process ends.

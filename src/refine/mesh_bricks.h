@@ -84,8 +84,8 @@ class MeshBricks {
         Number nearParents = 0;  ///< likewise; one more than the place in nearParents_
         ChildBits children = 0;
         std::int32_t shownBy = kNoElement;  ///< an element that touches it
-        std::int32_t elementsNear = -1;  ///< -1: not counted yet
-        float wishedByElementSize = -1;  ///< -1: not looked for yet
+        std::int32_t elementsNear = -1;     ///< -1: not counted yet
+        float wishedByElementSize = -1;     ///< -1: not looked for yet
         std::unique_ptr<const BrickFindings> findings;
         std::unique_ptr<const ValueMask> values;
     };

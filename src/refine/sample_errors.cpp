@@ -60,7 +60,8 @@ class LastLeaf {
     Vec3d local() const { return local_; }
 
   private:
-    bool holds(const Vec3d& placeWorld);
+    void locate(const Vec3d& placeWorld);
+    bool isInside() const;
 
     const BrickTree& tree_;
     const LeafTiles& tiles_;
@@ -70,22 +71,25 @@ class LastLeaf {
     Vec3d local_{0};
 };
 
-bool LastLeaf::holds(const Vec3d& placeWorld) {
+void LastLeaf::locate(const Vec3d& placeWorld) {
     const LeafTiles::Leaf& leaf = tiles_.leaf(std::size_t(leaf_));
-    const double edge = tree_.brickCells();
     local_ = placeWorld * leaf.inverseSpacing - leaf.firstPoint;
+}
+
+bool LastLeaf::isInside() const {
+    const double edge = tree_.brickCells();
     return local_.x >= 0 && local_.y >= 0 && local_.z >= 0 && local_.x < edge && local_.y < edge &&
            local_.z < edge;
 }
 
 std::int32_t LastLeaf::find(const Vec3d& placeWorld) {
     if (leaf_ >= 0 && credit_ > 0) {
-        const bool isSame = holds(placeWorld);
-        credit_ += isSame ? 1 : -1;
-        if (isSame) return leaf_;
+        locate(placeWorld);
+        credit_ += isInside() ? 1 : -1;
+        if (isInside()) return leaf_;
     }
     leaf_ = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
-    if (leaf_ >= 0) holds(placeWorld);
+    if (leaf_ >= 0) locate(placeWorld);
     return leaf_;
 }
 

@@ -30,8 +30,9 @@ struct Publication {
     /// Leaves that stay and touch what was removed: by the seam rule their values on that border may change.
     std::vector<GrowingLeaf> findBordering() const {
         std::vector<GrowingLeaf> bordering;
-        TESSERA_CHECK(tree || !within, "a place in no tree");
-        if (within) tree->findNeighbours(*within, bordering);
+        if (!within) return bordering;
+        TESSERA_CHECK(tree, "a place in no tree");
+        tree->findNeighbours(*within, bordering);
         return bordering;
     }
 };
