@@ -1,4 +1,5 @@
 tessera_test(brick_tree_test FOLDER brick LINK brick)
+tessera_test(overlap_test FOLDER brick OPTIMISED LINK brick reference)
 tessera_test(brick_growing_test FOLDER brick OPTIMISED LINK brick)
 tessera_test(brick_store_test FOLDER brick LINK refine)
 tessera_test(brick_plan_test FOLDER refine OPTIMISED LINK refine reference)

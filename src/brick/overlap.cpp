@@ -48,13 +48,17 @@ bool ElementOverlap::touches(const Box3d& box) const {
         if (std::abs(c.x) < half.x && std::abs(c.y) < half.y && std::abs(c.z) < half.z) return true;
     const double reach = glm::length(corners[0]);
     constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    // Of corners in one line normals are rounding alone, and say nothing of what the element holds.
+    constexpr double kLeastSine = 1e-10;
     bool holdsCentre = true;
     for (const auto& f : kFaces) {
-        const Vec3d normal = glm::cross(corners[std::size_t(f[1])] - corners[std::size_t(f[0])],
-                                        corners[std::size_t(f[2])] - corners[std::size_t(f[0])]);
+        const Vec3d a = corners[std::size_t(f[1])] - corners[std::size_t(f[0])];
+        const Vec3d b = corners[std::size_t(f[2])] - corners[std::size_t(f[0])];
+        const Vec3d normal = glm::cross(a, b);
         const Shadows shadows = shadowsOn(normal, corners, half, reach);
         if (shadows.areApart) return false;
-        holdsCentre = holdsCentre && shadows.holdCentre;
+        holdsCentre = holdsCentre && shadows.holdCentre &&
+                      glm::length(normal) > kLeastSine * glm::length(a) * glm::length(b);
     }
     if (holdsCentre) return true;
     const auto separates = [&](const Vec3d& axis) { return shadowsOn(axis, corners, half, reach).areApart; };

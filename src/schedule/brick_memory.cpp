@@ -16,13 +16,14 @@ void BrickMemory::add(Number brick, std::shared_ptr<const Block> samples) {
 }
 
 void BrickMemory::hold(Number brick) {
+    TESSERA_CHECK(contains(brick), "a brick is held that isn't there");
     Entry& entry = entries_[brick];
     if (entry.holds++ == 0) unlink(entry);
 }
 
 void BrickMemory::release(Number brick) {
+    TESSERA_CHECK(contains(brick) && entries_[brick].holds > 0, "a brick was let go that nobody holds");
     Entry& entry = entries_[brick];
-    TESSERA_CHECK(entry.holds > 0, "a brick was let go that nobody holds");
     if (--entry.holds > 0) return;
     entry.before = std::exchange(newest_, brick);
     entry.after = kNone;

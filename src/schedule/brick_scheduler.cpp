@@ -213,13 +213,12 @@ bool BrickScheduler::beginChange(const WishPlan::Split& split) {
         const MeshBricks::Number child = bricks_.child(split.brick, unsigned(std::countr_zero(bits)));
         change.bricks.push_back(child);
         const DepthKey& key = bricks_.key(child);
-        // What is there already must stay while room is made.
-        if (memory_.contains(child))
-            memory_.hold(child);
-        else
-            halves[std::size_t(key.index.z & 1)].push_back(key);
+        if (!memory_.contains(child)) halves[std::size_t(key.index.z & 1)].push_back(key);
     }
     const std::size_t missing = halves[0].size() + halves[1].size();
+    // What is there already must stay while room is made.
+    for (const MeshBricks::Number child : change.bricks)
+        if (memory_.contains(child)) memory_.hold(child);
     change.missing = missing;
     if (!makeRoom(missing)) {
         change.missing = 0;

@@ -1,0 +1,75 @@
+#include "brick/overlap.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "reference/random.h"
+
+namespace tessera {
+namespace {
+
+using Nodes = std::array<Vec3d, 4>;
+constexpr int kShapes = 5;
+
+/// A tetrahedron, a flat one, nodes in a line, a needle, one that holds the box many times.
+Nodes drawn(Random& random, int shape) {
+    Nodes nodes;
+    const Vec3d from = 20.0 * random.offset(), along = 30.0 * random.offset(),
+                beside = 30.0 * random.offset();
+    for (Vec3d& node : nodes) {
+        const double a = random.unit(), b = random.unit();
+        const Vec3d off = random.offset();
+        if (shape == 0) node = from + 20.0 * off;
+        if (shape == 1) node = from + a * along + b * beside;
+        if (shape == 2) node = from + a * along;
+        if (shape == 3) node = from + a * along + 1e-11 * off;
+        if (shape == 4) node = from + 200.0 * off;
+    }
+    return nodes;
+}
+
+TEST(ElementOverlap, WhatHasAPointInTheBoxTouchesIt) {
+    Random random(1);
+    for (int n = 0; n < 20000; ++n) {
+        const Nodes nodes = drawn(random, n % kShapes);
+        Vec3d inside(0);
+        double sum = 0;
+        for (const Vec3d& node : nodes) {
+            const double weight = random.unit();
+            inside += weight * node;
+            sum += weight;
+        }
+        inside /= sum;
+        // The place lies anywhere in the box, but for what rounds.
+        const Vec3d low = inside - 16.0 * (0.001 + 0.998 * random.place());
+        EXPECT_TRUE(ElementOverlap(nodes).touches({low, low + 16.0})) << n;
+    }
+}
+
+TEST(ElementOverlap, WhatAPlaneKeepsApartDoesNotTouch) {
+    Random random(2);
+    const Box3d box{Vec3d(-8), Vec3d(8)};
+    for (int n = 0; n < 40000; ++n) {
+        Nodes nodes = drawn(random, n % kShapes);
+        const Vec3d normal = glm::normalize(random.offset());
+        double lowest = std::numeric_limits<double>::infinity();
+        for (const Vec3d& node : nodes) lowest = std::min(lowest, glm::dot(normal, node));
+        const Vec3d shift = normal * (glm::dot(glm::abs(normal), box.max) + 1e-6 - lowest);
+        for (Vec3d& node : nodes) node += shift;
+        EXPECT_FALSE(ElementOverlap(nodes).touches(box)) << n;
+    }
+}
+
+TEST(ElementOverlap, NormalsOfNodesInALineDecideNothing) {
+    // 13 voxels apart, in the box's bounds; cross products of the edges are rounding alone.
+    const Nodes nodes{{{61.272329117518055, 12.633448828977588, 29.567121704755372},
+                       {85.77556203088272, 32.989350888266515, 46.51879157832667},
+                       {140.58074376164524, 78.51840069150501, 84.43376187411349},
+                       {155.81626420983406, 91.17521063826395, 94.973902185512}}};
+    EXPECT_FALSE(ElementOverlap(nodes).touches({{143.9921875, 47.9921875, 63.9921875}, {160, 64, 80}}));
+}
+
+}  // namespace
+}  // namespace tessera
