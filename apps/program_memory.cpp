@@ -1,6 +1,7 @@
 // Linked to programs, which then allocate by mimalloc, in large pages where the system has them: memory that
-// is written to for the first time costs far less. Such pages are kept until the program ends. mimalloc's own
-// operators can't throw and end the program.
+// is written to for the first time costs far less. Such pages are kept until the program ends, and each takes
+// milliseconds at once: with TESSERA_SMALL_PAGES there are none. mimalloc's own operators can't throw and end
+// the program.
 
 #include <mimalloc.h>
 
@@ -10,6 +11,7 @@
 
 namespace {
 
+#ifndef TESSERA_SMALL_PAGES
 // Of a number in a file of /proc; it may not be there.
 bool isZero(const char* path) {
     std::FILE* file = std::fopen(path, "r");
@@ -25,6 +27,7 @@ bool isZero(const char* path) {
     if (isZero("/proc/sys/vm/nr_hugepages") && isZero("/proc/sys/vm/nr_overcommit_hugepages"))
         mi_option_set_enabled_default(mi_option_large_os_pages, true);
 }
+#endif
 
 template <class Allocate>
 void* allocateOrThrow(const Allocate& allocate) {
