@@ -11,15 +11,12 @@ ElementOverlap::ElementOverlap(const std::array<Vec3d, 4>& nodes) : nodes_(nodes
 
 namespace {
 
-/// How an element and a box lie along one axis.
-struct Shadows {
-    bool areApart;
-    bool holdCentre;  ///< the box's centre lies well within the element's shadow
-};
+constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
 
-// Of corners that are given relative to the box's centre and a box of half size `half`. The tolerance covers
-// the rounding of the axis and of the projections; `reach` is how far the corners are.
-Shadows shadowsOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half, double reach) {
+// Whether the shadows on an axis lie apart, of corners that are given relative to the box's centre and a box
+// of half size `half`. The tolerance covers the rounding of the axis and of the projections; `reach` is how
+// far the corners are.
+bool areApartOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Vec3d& half, double reach) {
     double low = glm::dot(axis, corners[0]), high = low;
     double largest = std::abs(low);
     for (int i = 1; i < 4; ++i) {
@@ -32,7 +29,11 @@ Shadows shadowsOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const 
     const double radius = glm::dot(size, half);
     const double scale = std::max({largest, radius, (size.x + size.y + size.z) * reach});
     const double tolerance = 1e-12 * scale;
-    return {low > radius + tolerance || high < -radius - tolerance, low < -tolerance && high > tolerance};
+    return low > radius + tolerance || high < -radius - tolerance;
+}
+
+double sumOf(const Vec3d& size) {
+    return std::abs(size.x) + std::abs(size.y) + std::abs(size.z);
 }
 
 }  // namespace
@@ -47,21 +48,13 @@ bool ElementOverlap::touches(const Box3d& box) const {
     for (const Vec3d& c : corners)
         if (std::abs(c.x) < half.x && std::abs(c.y) < half.y && std::abs(c.z) < half.z) return true;
     const double reach = glm::length(corners[0]);
-    constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
-    // Of corners in one line normals are rounding alone, and say nothing of what the element holds.
-    constexpr double kLeastSine = 1e-10;
-    bool holdsCentre = true;
+    const auto separates = [&](const Vec3d& axis) { return areApartOn(axis, corners, half, reach); };
     for (const auto& f : kFaces) {
-        const Vec3d a = corners[std::size_t(f[1])] - corners[std::size_t(f[0])];
-        const Vec3d b = corners[std::size_t(f[2])] - corners[std::size_t(f[0])];
-        const Vec3d normal = glm::cross(a, b);
-        const Shadows shadows = shadowsOn(normal, corners, half, reach);
-        if (shadows.areApart) return false;
-        holdsCentre = holdsCentre && shadows.holdCentre &&
-                      glm::length(normal) > kLeastSine * glm::length(a) * glm::length(b);
+        const Vec3d &a = corners[std::size_t(f[0])], &b = corners[std::size_t(f[1])],
+                    &c = corners[std::size_t(f[2])];
+        if (separates(glm::cross(b - a, c - a))) return false;
     }
-    if (holdsCentre) return true;
-    const auto separates = [&](const Vec3d& axis) { return shadowsOn(axis, corners, half, reach).areApart; };
+    if (holds(centre)) return true;
     for (std::size_t a = 0; a < 4; ++a)
         for (std::size_t b = a + 1; b < 4; ++b) {
             const Vec3d edge = corners[b] - corners[a];
@@ -69,6 +62,26 @@ bool ElementOverlap::touches(const Box3d& box) const {
                 separates({-edge.y, edge.x, 0}))
                 return false;
         }
+    return true;
+}
+
+bool ElementOverlap::holds(const Vec3d& point) const {
+    // What lies on either side of a face by less may have been rounded there.
+    constexpr double kRounding = 1e-14;
+    if (glm::any(glm::lessThan(point, bounds_.min)) || glm::any(glm::greaterThan(point, bounds_.max)))
+        return false;
+    for (std::size_t f = 0; f < 4; ++f) {
+        const Vec3d& from = nodes_[std::size_t(kFaces[f][0])];
+        const Vec3d a = nodes_[std::size_t(kFaces[f][1])] - from,
+                    b = nodes_[std::size_t(kFaces[f][2])] - from;
+        const Vec3d fourth = nodes_[3 - f] - from, own = point - from;
+        const Vec3d normal = glm::cross(a, b);
+        const double rounding = kRounding * sumOf(a) * sumOf(b);
+        const double inner = glm::dot(normal, fourth), side = glm::dot(normal, own);
+        if (!(std::abs(inner) > rounding * sumOf(fourth) && std::abs(side) > rounding * sumOf(own) &&
+              (inner > 0) == (side > 0)))
+            return false;
+    }
     return true;
 }
 

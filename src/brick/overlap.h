@@ -23,6 +23,8 @@ class ElementOverlap {
     /// Separating axes of the faces and of the edge pairs, on top of boundsTouch. Rounding never separates
     /// what touches.
     bool touches(const Box3d& box) const;
+    /// The point lies inside the element. Rounding may deny that, but never claims it.
+    bool holds(const Vec3d& point) const;
 
   private:
     std::array<Vec3d, 4> nodes_;

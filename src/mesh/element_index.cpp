@@ -549,12 +549,9 @@ std::int64_t ElementIndex::count(const Box3d& boxWorld, const PointGrid* grid) c
 }
 
 std::int64_t ElementIndex::countAbout(const Box3d& boxWorld) const {
-    constexpr std::size_t kSmallest = 512;
-    constexpr std::int64_t kMany = 8 * kSmallest;
+    constexpr std::size_t kSmallest = 64;
     MappedBox box;
-    if (!clip(boxWorld, box)) return 0;
-    const std::int64_t about = count(levels_.size() - 1, 0, box, kSmallest);
-    return about >= kMany ? about : count(levels_.size() - 1, 0, box, 0);
+    return clip(boxWorld, box) ? count(levels_.size() - 1, 0, box, kSmallest) : 0;
 }
 
 const ElementIndex& SharedElementIndex::get(const Execution& execution) const {

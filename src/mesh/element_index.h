@@ -50,7 +50,7 @@ class ElementIndex {
     /// few nanoseconds for each point in the box.
     std::int64_t count(const Box3d& boxWorld, const PointGrid* grid = nullptr) const;
 
-    /// The same to within a fifth or so where there are thousands: faster for boxes that cut many elements.
+    /// The same to within a third or so where there are hundreds: faster for boxes that cut many elements.
     std::int64_t countAbout(const Box3d& boxWorld) const;
 
     /// Calls visit(element) for every element whose box, perhaps a little enlarged, passes meets(boxWorld),

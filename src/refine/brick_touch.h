@@ -45,6 +45,13 @@ class BrickChildren {
     /// Of the children that are asked for.
     /// @param element one that touches the parent, in index space of the children's depth.
     ChildBits touchedBy(const ElementOverlap& element, unsigned asked = 0xff) const;
+    /// A point that the touch boxes of all eight share, and the middle of one; index space of their depth.
+    /// What holds a point of a touch box touches the brick and all above.
+    Vec3d shared() const { return (boxes_.halves[0].max + boxes_.halves[1].min) * 0.5; }
+    Vec3d middle(unsigned child) const {
+        const Box3d box = boxes_.box(child);
+        return (box.min + box.max) * 0.5;
+    }
 
   private:
     DepthKey parent_;

@@ -87,38 +87,52 @@ std::optional<MeshBricks::Number> MeshBricks::look(const DepthKey& key) {
 void MeshBricks::findChildren(Number brick) {
     const DepthKey key = bricks_[brick].key;
     const BrickChildren children(key, frame_);
-    const BrickPath path(mesh_, frame_, rootRange_, key);
-    std::array<Box3d, 8> boxes;
-    for (unsigned c = 0; c < 8; ++c) boxes[c] = boxAround(children.key(c), frame_);
+    std::optional<BrickPath> path;
     unsigned missing = children.allowed();
     ChildBits there = 0;
     std::array<std::int32_t, 8> shownBy;
-    const auto mayShow = [&](const Box3d& near) {
-        for (unsigned bits = missing; bits != 0; bits &= bits - 1)
-            if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
-        return false;
-    };
-    const auto show = [&](std::int32_t e) {
-        const ChildBits touched = children.touchedBy(overlapOf(mesh_, frame_, e, key.depth + 1), missing);
-        if (touched == 0 || !path.holds(e)) return;
+    const auto show = [&](std::int32_t e, unsigned touched) {
         for (unsigned bits = touched; bits != 0; bits &= bits - 1)
             shownBy[std::size_t(std::countr_zero(bits))] = e;
         there = ChildBits(there | touched);
-        missing &= ~unsigned(touched);
+        missing &= ~touched;
     };
-    // The one that showed the brick may be as large, and those around the middle of a child are few.
-    show(bricks_[brick].shownBy);
-    const auto showAround = [&](const Box3d& box, unsigned wanted) {
-        if ((missing & wanted) == 0) return;
-        const Vec3d middle = (box.min + box.max) * 0.5;
+    const auto overlap = [&](std::int32_t e) { return overlapOf(mesh_, frame_, e, key.depth + 1); };
+    const auto showTouched = [&](std::int32_t e, unsigned asked) {
+        const unsigned touched = children.touchedBy(overlap(e), missing & asked);
+        if (touched == 0) return;
+        if (!path) path.emplace(mesh_, frame_, rootRange_, key);
+        if (path->holds(e)) show(e, touched);
+    };
+    const double spacing = frame_.spacingWorld(key.depth + 1);
+    // Of the elements around a point of those children one that holds it shows them all.
+    const auto showAround = [&](const Vec3d& point, unsigned asked) {
+        if ((missing & asked) == 0) return;
+        const Vec3d world = frame_.originWorld + point * spacing;
         found_.clear();
-        index_.query({middle, middle}, found_);
+        index_.query({world, world}, found_);
         for (const std::int32_t e : found_)
-            if ((missing & wanted) != 0) show(e);
+            if (overlap(e).holds(point)) return show(e, missing & asked);
+        for (const std::int32_t e : found_) showTouched(e, asked);
     };
-    showAround(boxAround(key, frame_), 0xff);
-    for (unsigned c = 0; c < 8; ++c) showAround(boxes[c], 1u << c);
-    if (missing != 0) index_.walk(mayShow, show);
+    // The one that showed the brick may be as large.
+    const std::int32_t own = bricks_[brick].shownBy;
+    if (const ElementOverlap large = overlap(own); large.holds(children.shared()))
+        show(own, missing);
+    else
+        show(own, children.touchedBy(large, missing));
+    showAround(children.shared(), 0xff);
+    for (unsigned c = 0; c < 8; ++c) showAround(children.middle(c), 1u << c);
+    if (missing != 0) {
+        std::array<Box3d, 8> boxes;
+        for (unsigned c = 0; c < 8; ++c) boxes[c] = boxAround(children.key(c), frame_);
+        const auto mayShow = [&](const Box3d& near) {
+            for (unsigned bits = missing; bits != 0; bits &= bits - 1)
+                if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
+            return false;
+        };
+        index_.walk(mayShow, [&](std::int32_t e) { showTouched(e, 0xff); });
+    }
     const std::size_t first = bricks_.size();
     TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
     bricks_.grow(first + 8);

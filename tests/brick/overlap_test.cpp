@@ -62,6 +62,40 @@ TEST(ElementOverlap, WhatAPlaneKeepsApartDoesNotTouch) {
     }
 }
 
+TEST(ElementOverlap, HoldsWhatLiesWellInsideAndNothingOutside) {
+    Random random(3);
+    int held = 0, asked = 0;
+    for (int n = 0; n < 40000; ++n) {
+        const Nodes nodes = drawn(random, n % kShapes);
+        const ElementOverlap element(nodes);
+        // Weights of nodes, of which one may be below 0 by a little.
+        Vec3d point(0);
+        double sum = 0, least = 1;
+        for (const Vec3d& node : nodes) {
+            const double weight = random.unit() - 0.1;
+            point += weight * node;
+            sum += weight;
+            least = std::min(least, weight);
+        }
+        if (sum < 0.5) continue;
+        point /= sum;
+        const bool isSolid = n % kShapes == 0 || n % kShapes == 4;
+        if (!isSolid || least < 0) {
+            EXPECT_FALSE(element.holds(point)) << n;
+            continue;
+        }
+        if (least < 0.01) continue;
+        ++asked;
+        held += element.holds(point);
+    }
+    EXPECT_GT(asked, 5000);
+    EXPECT_GT(held, asked * 99 / 100);
+    const ElementOverlap unit({Vec3d{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
+    EXPECT_TRUE(unit.holds({0.25, 0.25, 0.25}));
+    EXPECT_FALSE(unit.holds({0.25, 0.25, 0}));  // on a face nothing is sure
+    EXPECT_FALSE(unit.holds(Vec3d(std::numeric_limits<double>::quiet_NaN())));
+}
+
 TEST(ElementOverlap, NormalsOfNodesInALineDecideNothing) {
     // 13 voxels apart, in the box's bounds; cross products of the edges are rounding alone.
     const Nodes nodes{{{61.272329117518055, 12.633448828977588, 29.567121704755372},
