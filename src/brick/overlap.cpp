@@ -66,8 +66,12 @@ bool ElementOverlap::touches(const Box3d& box) const {
 }
 
 bool ElementOverlap::holds(const Vec3d& point) const {
-    // What lies on either side of a face by less may have been rounded there.
-    constexpr double kRounding = 1e-14;
+    // What lies on either side of a face by less may have been rounded there; of numbers so small or large
+    // that bounds vanish or products overflow nothing is sure.
+    constexpr double kRounding = 1e-14, kLeast = 1e-250, kMost = 1e250;
+    const auto isSure = [&](double side, double bound) {
+        return bound > kLeast && std::abs(side) > bound && std::abs(side) < kMost;
+    };
     if (glm::any(glm::lessThan(point, bounds_.min)) || glm::any(glm::greaterThan(point, bounds_.max)))
         return false;
     for (std::size_t f = 0; f < 4; ++f) {
@@ -78,8 +82,8 @@ bool ElementOverlap::holds(const Vec3d& point) const {
         const Vec3d normal = glm::cross(a, b);
         const double rounding = kRounding * sumOf(a) * sumOf(b);
         const double inner = glm::dot(normal, fourth), side = glm::dot(normal, own);
-        if (!(std::abs(inner) > rounding * sumOf(fourth) && std::abs(side) > rounding * sumOf(own) &&
-              (inner > 0) == (side > 0)))
+        if (!isSure(inner, rounding * sumOf(fourth)) || !isSure(side, rounding * sumOf(own)) ||
+            (inner > 0) != (side > 0))
             return false;
     }
     return true;

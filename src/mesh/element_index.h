@@ -50,7 +50,8 @@ class ElementIndex {
     /// few nanoseconds for each point in the box.
     std::int64_t count(const Box3d& boxWorld, const PointGrid* grid = nullptr) const;
 
-    /// The same to within a third or so where there are hundreds: faster for boxes that cut many elements.
+    /// The same to within a factor of 3 or so, estimated where the box cuts groups of up to 64 elements:
+    /// faster.
     std::int64_t countAbout(const Box3d& boxWorld) const;
 
     /// Calls visit(element) for every element whose box, perhaps a little enlarged, passes meets(boxWorld),
@@ -97,7 +98,8 @@ class ElementIndex {
     bool clip(const Box3d& boxWorld, MappedBox& box) const;
     void query(std::size_t level, std::int64_t node, const MappedBox& box, std::size_t most,
                std::vector<std::int32_t>& elements) const;
-    /// @param smallest subtrees of no more elements that meet the box in part count by half; 0: none do.
+    static std::int64_t shareOf(std::int64_t elements, const MappedBox& below, const MappedBox& box);
+    /// @param smallest subtrees of no more elements that meet the box in part count by shareOf(); 0: none do.
     std::int64_t count(std::size_t level, std::int64_t node, const MappedBox& box,
                        std::size_t smallest) const;
     template <class Visit>

@@ -93,7 +93,17 @@ TEST(ElementOverlap, HoldsWhatLiesWellInsideAndNothingOutside) {
     const ElementOverlap unit({Vec3d{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}});
     EXPECT_TRUE(unit.holds({0.25, 0.25, 0.25}));
     EXPECT_FALSE(unit.holds({0.25, 0.25, 0}));  // on a face nothing is sure
+    EXPECT_FALSE(unit.holds({0.25, 0.25, -1e-12}));
     EXPECT_FALSE(unit.holds(Vec3d(std::numeric_limits<double>::quiet_NaN())));
+    for (const double scale : {1e-110, 1e-95, 1e95, 1e105}) {
+        Nodes nodes{Vec3d{0.1, 0.2, 0.3}, {1, 0, 0.1}, {0.3, 1, 0}, {0.2, 0.1, 1}};
+        for (Vec3d& node : nodes) node *= scale;
+        for (int n = 0; n < 2000; ++n) {
+            const double a = random.unit(), b = random.unit() * (1 - a), out = 1e-7 * random.unit();
+            const Vec3d beyond = a * nodes[0] + b * nodes[1] + (1 - a - b + out) * nodes[2] - out * nodes[3];
+            EXPECT_FALSE(ElementOverlap(nodes).holds(beyond)) << scale;
+        }
+    }
 }
 
 TEST(ElementOverlap, NormalsOfNodesInALineDecideNothing) {
