@@ -13,6 +13,10 @@ namespace {
 
 constexpr int kFaces[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
 
+double sumOf(const Vec3d& size) {
+    return std::abs(size.x) + std::abs(size.y) + std::abs(size.z);
+}
+
 // Whether the shadows on an axis lie apart, of corners that are given relative to the box's centre and a box
 // of half size `half`. The tolerance covers the rounding of the axis and of the projections; `reach` is how
 // far the corners are.
@@ -25,15 +29,10 @@ bool areApartOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Ve
         high = std::max(high, d);
         largest = std::max(largest, std::abs(d));
     }
-    const Vec3d size = glm::abs(axis);
-    const double radius = glm::dot(size, half);
-    const double scale = std::max({largest, radius, (size.x + size.y + size.z) * reach});
+    const double radius = glm::dot(glm::abs(axis), half);
+    const double scale = std::max({largest, radius, sumOf(axis) * reach});
     const double tolerance = 1e-12 * scale;
     return low > radius + tolerance || high < -radius - tolerance;
-}
-
-double sumOf(const Vec3d& size) {
-    return std::abs(size.x) + std::abs(size.y) + std::abs(size.z);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "brick_test_meshes.h"
 #include "gl/gl_program.h"
 #include "gl_test_tools.h"
-#include "pool/pool_on_device.h"
+#include "pool/face_steps.h"
 #include "refine/plan_frame.h"
 #include "refine/resample_tree.h"
 #include "schedule/brick_scheduler.h"
@@ -263,64 +263,15 @@ void expectIndex(Bench& bench, std::mt19937& random, int places) {
     EXPECT_GT(misses, places / 100);
 }
 
-/// Trilinear interpolation of a slot's codes; `largest` receives the largest of them.
-double interpolate(const PoolOnDevice& device, std::uint32_t slot, int channel, const Vec3d& local,
-                   double& largest) {
-    const CellPlace place = locateInBrick(local, kCells);
-    double sum = 0;
-    for (int c = 0; c < 8; ++c) {
-        const double weight = cornerWeight(place.fraction, c);
-        if (weight == 0) continue;
-        const double code = device.code(slot, channel, place.cell + cornerOffset(c));
-        sum += weight * code;
-        largest = std::max(largest, std::abs(code));
-    }
-    return sum;
-}
-
-/// At random points on faces the linear field's codes interpolate to one value on both sides.
-void expectNoStep(Bench& bench, std::mt19937& random, int perLeaf, int& acrossDepths) {
-    const auto state = bench.pool->state();
-    const PoolOnDevice device(*bench.pool, *state);
-    const GrowingTree& tree = bench.scheduler->tree();
-    std::uniform_real_distribution<double> share(0, 1);
+/// At random points on faces the linear field has one value on both sides.
+void expectNoStep(Bench& bench, std::mt19937& random, int perLeaf, std::int64_t& acrossDepths) {
     const int channel =
         int(std::find(bench.fields.begin(), bench.fields.end(), kLinear) - bench.fields.begin());
-    double worst = 0;
-    for (const GrowingLeaf& leaf : tree.leaves())
-        for (int i = 0; i < perLeaf; ++i) {
-            const int axis = int(random() % 3), side = int(random() % 2);
-            Vec3i beside = leaf.key.index;
-            beside[axis] += side ? 1 : -1;
-            const auto other = tree.findCovering({leaf.key.depth, beside});
-            if (!other) continue;
-            Vec3d local = double(kCells) * Vec3d(share(random), share(random), share(random));
-            local[axis] = side * kCells;
-            const Vec3d place = Vec3d(leaf.key.index * kCells) + local;  // in this depth's voxels
-            const int apart = leaf.key.depth - other->key.depth;
-            const Vec3d there = place * std::ldexp(1.0, -apart) - Vec3d(other->key.index * kCells);
-            double largest = 0;
-            const double here = interpolate(device, *bench.target->slotOf(leaf), channel, local, largest);
-            const double beyond = interpolate(device, *bench.target->slotOf(*other), channel, there, largest);
-            double step = 0;
-            switch (bench.pool->coding().format()) {
-                case SampleFormat::r32f:
-                    step = 4 * (double(std::nextafter(float(largest), INFINITY)) - largest);
-                    break;
-                case SampleFormat::r16f:
-                    step = 0x1p-11;
-                    break;
-                case SampleFormat::r16:
-                    step = 1 / 65535.0;
-                    break;
-                case SampleFormat::r8:
-                    step = 1 / 255.0;
-                    break;
-            }
-            worst = std::max(worst, std::abs(here - beyond) / step);
-            acrossDepths += apart;
-        }
-    EXPECT_LE(worst, 1.0001);
+    const FaceSteps steps =
+        stepsOnFaces(*bench.pool, *bench.target, bench.scheduler->tree(), {channel}, random, perLeaf);
+    EXPECT_LE(steps.texels, 1.0001);
+    EXPECT_LE(steps.values, 4);
+    acrossDepths += steps.acrossDepths;
 }
 
 class PoolOfFormat : public testing::TestWithParam<std::tuple<SampleFormat, Algorithm>> {};
@@ -343,7 +294,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     const int updates = asked("TESSERA_POOL_UPDATES", isSlow ? 4 : 40);
     const int every = isSlow ? std::max(4, updates / 100) : 20;
     Seen seen;
-    int acrossDepths = 0;
+    std::int64_t acrossDepths = 0;
     for (int step = 1; step <= updates && !HasFailure(); ++step) {
         bench.update(random);
         if (step % every != 0 || bench.scheduler->tree().leafCount() == 0) continue;
