@@ -245,7 +245,8 @@ PointValues ShownBricks::valuesAt(const GrowingLeaf& asked, const IndexBox& poin
         const bool isInside = !isOnBorder(p - leaf.samples->box.min);
         const PointSource source =
             isInside ? ownSample(leaf, p, walk, values) : resolve(key.depth, p, leaf, near, walk, values);
-        result.covered[n++] = source == PointSource::covered;
+        // Beside the surface a coarser neighbour's corners may lie outside where the point itself doesn't.
+        result.covered[n++] = source == PointSource::covered || leaf.samples->covered(p);
     });
     return result;
 }

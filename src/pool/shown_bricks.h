@@ -14,7 +14,8 @@
 
 namespace tessera {
 
-/// The values of some points, point by point: channels() each. Beside each point whether it is covered.
+/// The values of some points, point by point: channels() each. Beside each point whether it is covered: a
+/// sample there is, or the seam rule interpolates between samples that are.
 struct PointValues {
     std::vector<double> values;  ///< NaN where a value isn't finite
     std::vector<std::uint8_t> covered;

@@ -23,7 +23,7 @@ struct Texels {
 /// A code is ValueCoding's as a float, rounded to the nearest of the format (to even for r16f). Every texel
 /// holds a number that may be interpolated: outside the mesh the value of the nearest mesh point, and the
 /// code 0 where a value isn't finite. So the coverage has a texture in every format. Its texel is 0 outside
-/// the mesh, else (1 + a bit a channel of the group whose value isn't finite) / 255.
+/// the mesh (PointValues::covered), else (1 + a bit a channel of the group whose value isn't finite) / 255.
 class TexelCoding {
   public:
     /// @param codings of all channels, all of this format.

@@ -186,7 +186,8 @@ bool WishPlan::split(MeshBricks::Number brick) {
         if (bricks_.key(split.brick).depth + 1 >= bricks_.frame().maxDepth) continue;
         const double spacing = bricks_.spacingWorld(split.brick) / 2;
         const ChildWishes wishes =
-            wishesOfChildren(wishes_.focus, wishes_.finestSpacingWorld, bricks_.childBoxesWorld(split.brick));
+            wishesOfChildren(wishes_.focus, wishes_.finestSpacingWorld, bricks_.childBoxesWorld(split.brick),
+                             spacing / std::numbers::sqrt2);
         for (unsigned bits = split.children; bits != 0; bits &= bits - 1) {
             const auto c = unsigned(std::countr_zero(bits));
             consider(bricks_.child(split.brick, c), spacing, wishes.wishedWorld[c], wishes.holdsFocus[c]);

@@ -58,7 +58,7 @@ bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld) {
 }
 
 ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingWorld,
-                             const ChildBoxes& boxesWorld) {
+                             const ChildBoxes& boxesWorld, double enoughWorld) {
     ChildWishes wishes;
     wishes.wishedWorld.fill(kNoWish);
     wishes.holdsFocus.fill(false);
@@ -70,17 +70,16 @@ ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingW
                 glm::max(glm::max(one.boxWorld.min - box.max, box.min - one.boxWorld.max), Vec3d(0));
             for (int a = 0; a < 3; ++a) square[a][half] = apart[a] * apart[a];
         }
-        std::array<double, 8> apart, wished;
-        for (unsigned c = 0; c < 8; ++c)
-            apart[c] = std::sqrt(square[0][c & 1] + square[1][c >> 1 & 1] + square[2][c >> 2]);
+        // Most are so far away that their wish doesn't count, which the square of the distance shows.
+        const double farthest =
+            enoughWorld / finestSpacingWorld * one.radiusWorld * (1 + 1e-9) + one.roundingWorld;
         for (unsigned c = 0; c < 8; ++c) {
-            const double far = std::max(0.0, apart[c] - one.roundingWorld) / one.radiusWorld;
-            wished[c] = finestSpacingWorld * std::max(1.0, far);
-        }
-        for (unsigned c = 0; c < 8; ++c) {
+            const double apartSquare = square[0][c & 1] + square[1][c >> 1 & 1] + square[2][c >> 2];
+            if (apartSquare > farthest * farthest) continue;
             if (!one.within.empty() && !reaches(one, boxesWorld.box(c))) continue;
-            wishes.wishedWorld[c] = std::min(wishes.wishedWorld[c], wished[c]);
-            wishes.holdsFocus[c] = wishes.holdsFocus[c] || apart[c] == 0;
+            const double far = std::max(0.0, std::sqrt(apartSquare) - one.roundingWorld) / one.radiusWorld;
+            wishes.wishedWorld[c] = std::min(wishes.wishedWorld[c], finestSpacingWorld * std::max(1.0, far));
+            wishes.holdsFocus[c] = wishes.holdsFocus[c] || apartSquare == 0;
         }
     }
     return wishes;

@@ -32,13 +32,14 @@ struct ChildBoxes {
     }
 };
 
-/// wishedByFocus() and holdsFocus() of eight children at once.
+/// wishedByFocus() and holdsFocus() of eight children at once, for bricks that ask for `enoughWorld`: wishes
+/// for coarser spacings may be given as kNoWish.
 struct ChildWishes {
     std::array<double, 8> wishedWorld;
     std::array<bool, 8> holdsFocus;
 };
 ChildWishes wishesOfChildren(std::span<const Focus> focus, double finestSpacingWorld,
-                             const ChildBoxes& boxesWorld);
+                             const ChildBoxes& boxesWorld, double enoughWorld);
 
 /// Whether bricks wish to be split: whether their spacing is coarser than the one wished for, and not by
 /// rounding alone.

@@ -146,20 +146,30 @@ class Expected {
           nearest_(bench.mesh, 1) {
         BindOptions bind = bench.options.refine.bind;
         bind.route = Route::pass;
-        const auto bound = bench.resampler->bind(bench.mesh, bench.fields, bind);
+        bound_ = bench.resampler->bind(bench.mesh, bench.fields, bind);
         ResampleStatistics statistics;
-        store_ = resampleTree(tree_, *bound, int(bench.fields.size()), {.threads = 2}, statistics);
+        store_ = resampleTree(tree_, *bound_, int(bench.fields.size()), {.threads = 2}, statistics);
         reconstruction_.emplace(bench.mesh, bench.fields, tree_, store_, nearest_);
         extendEverywhere(tree_, *reconstruction_, store_);
     }
+    /// Whether the point is covered by the seam rule.
     bool at(const DepthKey& leaf, const Vec3i& local, std::span<double> values) const {
         const Vec3i p = leaf.index * kCells + local;
         return reconstruction_->resolve(levelOf(leaf.depth, finest_), p, 0, values) == PointSource::covered;
+    }
+    /// The leaf's own samples at all points of its closed box.
+    Block ownSamples(const DepthKey& leaf) const {
+        const IndexBox closed{leaf.index * kCells, (leaf.index + 1) * kCells + 1};
+        Block block;
+        bound_->resample(tree_.lattice(levelOf(leaf.depth, finest_)), {&closed, 1},
+                         [&](std::size_t, const Block& made) { block = made; }, {.threads = 1});
+        return block;
     }
 
   private:
     Depth finest_;
     BrickTree tree_;
+    std::unique_ptr<BoundResampler> bound_;
     NearestOnDemand nearest_;
     BrickStore store_;
     std::optional<Reconstruction> reconstruction_;
@@ -208,8 +218,9 @@ void expectPool(Bench& bench, Seen& seen) {
         const PointValues values = bench.target->bricks().valuesAt(leaf, closed);
         const int channels = int(bench.fields.size());
         std::vector<double> want(bench.fields.size());
+        const Block own = expected.ownSamples(leaf.key);
         forEachLocal([&](const Vec3i& local, std::size_t n) {
-            const bool isCovered = expected.at(leaf.key, local, want);
+            const bool isCovered = expected.at(leaf.key, local, want) || own.coverage[n] != 0;
             wrongValues += bool(values.covered[n]) != isCovered;
             std::vector<int> coverage(bench.pool->coding().groupCount(), isCovered ? 1 : 0);
             for (int c = 0; c < channels; ++c) {

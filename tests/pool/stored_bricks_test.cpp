@@ -29,6 +29,12 @@ Vec3i texelAt(int n) {
     return {n % 9, n / 9 % 9, n / 81};
 }
 
+bool isOnFace(const Vec3i& texel) {
+    for (int a = 0; a < 3; ++a)
+        if (texel[a] == 0 || texel[a] == kCells) return true;
+    return false;
+}
+
 TetMesh ballWithFields() {
     TetMesh mesh = ballMesh(5, 1);
     addPointField(mesh, "wave", [](const Vec3d& p) { return std::sin(5 * p.x) + p.y * p.z; });
@@ -112,8 +118,16 @@ class StoredBricksTest : public testing::Test {
                 const bool isCovered = expected.coverage(a, 0, texel) != 0;
                 const bool isSame = expected.bits(a, 0, texel) == found.bits(b, 0, texel) &&
                                     expected.bits(a, 1, texel) == found.bits(b, 1, texel);
-                ASSERT_EQ(expected.coverage(a, 0, texel), found.coverage(b, 0, texel));
-                ASSERT_TRUE(isSame || !isCovered) << "samples are the same, bit for bit";
+                // Without an extension corners outside have other values, which faces to coarser bricks take.
+                const bool mayDiffer = layers == 0 && isOnFace(texel);
+                ASSERT_TRUE(isSame || !isCovered || mayDiffer) << "samples are the same, bit for bit";
+                // A file has no samples of points on + faces, so of those that a coarser brick owns it can't
+                // tell that they are inside where the corners around them aren't.
+                const bool isFound = found.coverage(b, 0, texel) != 0;
+                const bool isOwn = glm::all(glm::lessThan(texel, Vec3i(kCells)));
+                ASSERT_TRUE(isFound == isCovered || (isCovered && !isOwn));
+                ASSERT_TRUE(!isFound || mayDiffer ||
+                            expected.coverage(a, 0, texel) == found.coverage(b, 0, texel));
                 isSame_[std::size_t(at)][std::size_t(n)] = isSame;
                 different_ += !isSame;
                 uncovered_ += !isCovered;
