@@ -31,8 +31,9 @@ struct Focus {
 Focus pointFocus(const Vec3d& pointWorld, double radiusWorld, double ballWorld = 0);
 Focus boxFocus(const Box3d& boxWorld, double radiusWorld);
 
-/// How a picture is taken.
+/// How a picture is taken: by rays from the eye, or by parallel ones.
 struct Camera {
+    /// With parallel rays the middle of the plane that they start from.
     Vec3d eyeWorld{0};
     /// Any length but 0.
     Vec3d forwardWorld{0, 0, -1};
@@ -42,11 +43,13 @@ struct Camera {
     double openingDegrees = 45;
     int widthPixels = 1024;
     int heightPixels = 1024;
+    /// Above 0: rays are parallel, and the picture is so high; the opening doesn't count.
+    double heightWorld = 0;
 };
 
 /// What a camera sees, as fine as its pixels and no finer than `finestSpacingWorld`: the distance between
-/// neighbouring pixels is proportional to that from the eye. Throws InputError for a camera that sees
-/// nothing.
+/// neighbouring pixels is proportional to that from the eye. With parallel rays it is one for all, and what
+/// is seen is a box without an end. Throws InputError for a camera that sees nothing.
 Focus cameraFocus(const Camera& camera, double finestSpacingWorld);
 
 }  // namespace tessera

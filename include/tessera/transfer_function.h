@@ -30,6 +30,9 @@ std::array<double, 4> shownAs(const TransferFunction::Stop& stop);
 /// The same of a finite value; at a step, of what stands above it.
 std::array<double, 4> shownAt(const TransferFunction& function, double value);
 
+/// Whether some value from `low` to `high` has an opacity above 0.
+bool showsAny(const TransferFunction& function, double low, double high);
+
 /// Throws InputError for stops out of order or out of range, and for none.
 void checkTransferFunction(const TransferFunction& function);
 

@@ -214,6 +214,17 @@ RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options) {
     return canvas;
 }
 
+RgbImage overGround(const RgbaImage& image, const std::array<double, 3>& ground) {
+    RgbImage result{image.width, image.height, {}};
+    result.rgb.reserve(3 * image.pixels.size());
+    for (const Rgba& pixel : image.pixels)
+        for (std::size_t c = 0; c < 3; ++c) {
+            const double value = double(pixel[c]) + (1 - double(pixel[3])) * ground[c];
+            result.rgb.push_back(std::uint8_t(std::lround(255 * std::clamp(value, 0.0, 1.0))));
+        }
+    return result;
+}
+
 void writePng(const std::string& path, const RgbImage& image) {
     png_image png;
     std::memset(&png, 0, sizeof png);

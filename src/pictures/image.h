@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "base/rgba_image.h"
 #include "brick/seams.h"
 #include "mesh/field_range.h"
 #include "tessera/execution.h"
@@ -52,6 +54,9 @@ struct PictureOptions {
 /// The values in colours, a light pattern where there are none, the title, and a colour bar with five
 /// labelled ticks.
 RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options);
+
+/// A picture before a ground of one colour, red, green and blue from 0 to 1.
+RgbImage overGround(const RgbaImage& image, const std::array<double, 3>& ground);
 
 /// Throws IoError; nothing stands at `path` until the file is whole.
 void writePng(const std::string& path, const RgbImage& image);

@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "refine/camera_view.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -96,6 +97,7 @@ void appendUnion(std::vector<RaySpan>& spans, std::vector<RaySpan>& all) {
 
 MeshRays::MeshRays(const TetMesh& mesh, const Camera& camera, const Execution& execution) : camera_(camera) {
     const CameraView view = viewOf(camera);
+    if (view.isParallel) throw InputError("rays through a mesh start from an eye");
     std::vector<PixelBox> boxes(mesh.tets.size());
     parallelForChunks(execution, mesh.elementCount(), 4096, [&](std::int64_t begin, std::int64_t end) {
         for (std::size_t e = std::size_t(begin); e < std::size_t(end); ++e)
@@ -110,7 +112,7 @@ MeshRays::MeshRays(const TetMesh& mesh, const Camera& camera, const Execution& e
             const auto faces = halfSpaces(cornersFromEye(mesh, e, camera.eyeWorld));
             if (!faces) continue;
             for (int x = box.x0; x <= box.x1; ++x)
-                if (const auto span = cut(*faces, view.directionOf(camera, x, int(y))))
+                if (const auto span = cut(*faces, view.rayOf(camera, x, int(y)).direction))
                     found[std::size_t(x)].push_back(*span);
         }
         Row& row = rows_[std::size_t(y)];

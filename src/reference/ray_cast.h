@@ -3,30 +3,19 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "base/rgba_image.h"
 #include "brick/brick_tree.h"
 #include "brick/seams.h"
 #include "mesh/field_range.h"
 #include "reference/mesh_rays.h"
 #include "tessera/execution.h"
+#include "tessera/focus.h"
 #include "tessera/transfer_function.h"
 
 namespace tessera {
-
-/// Red, green and blue, each multiplied by the opacity, and the opacity, from 0 to 1.
-using Rgba = std::array<float, 4>;
-
-/// A picture on a black ground, row by row from the top left.
-struct RgbaImage {
-    int width = 0;
-    int height = 0;
-    std::vector<Rgba> pixels;  ///< width x height
-
-    const Rgba& at(int x, int y) const {
-        return pixels[std::size_t(y) * std::size_t(width) + std::size_t(x)];
-    }
-};
 
 /// How two pictures of one size differ in red, green and blue.
 struct ImageDifference {
@@ -43,6 +32,14 @@ struct RayCastOptions {
     double layerWorld = 1;
     /// Length of a step, in voxels of the brick that the ray is in; above 0.
     double stepVoxels = 0.25;
+    /// Above 0: steps end on planes across the view in place, so many to a voxel, counted from the eye.
+    double slicesAVoxel = 0;
+};
+
+/// What is at the points of a brick's closed box, x the fastest.
+struct BrickPoints {
+    std::vector<float> values;
+    std::vector<std::uint8_t> covered;  ///< 0 outside the mesh
 };
 
 /// Draws one channel of a reconstruction: along each ray, from the front to the back, a step of length s in
@@ -53,6 +50,8 @@ struct RayCastOptions {
 /// value that isn't finite. The same for any number of threads.
 class RayCaster {
   public:
+    /// @param points of each leaf of the tree.
+    RayCaster(const BrickTree& tree, std::vector<BrickPoints> points);
     /// Copies the tree and the values of the closed boxes of its leaves, 4 (B + 1)^3 bytes each.
     RayCaster(const BrickTree& tree, const Reconstruction& reconstruction, int channel,
               const Execution& execution);
@@ -60,14 +59,23 @@ class RayCaster {
     /// Throws InputError for a transfer function that isn't one and options out of range.
     RgbaImage draw(const MeshRays& rays, const TransferFunction& function, const RayCastOptions& options,
                    const Execution& execution) const;
+    /// Without a mesh: what lies in all of `within`, where the points' coverage, interpolated, is at least a
+    /// half.
+    RgbaImage draw(const Camera& camera, std::span<const HalfSpace> within, const TransferFunction& function,
+                   const RayCastOptions& options, const Execution& execution) const;
 
   private:
-    /// Values at the points of a closed box, x the fastest, and the range of the finite ones.
-    struct Brick {
-        std::vector<float> values;
+    /// With the range of the finite values.
+    struct Brick : BrickPoints {
         ValueRange range;
     };
     class Ray;
+
+    void findRange(Brick& brick) const;
+    template <class SpansOf>
+    RgbaImage drawAlong(const Camera& camera, const SpansOf& spansOf, bool isOutlinedBySamples,
+                        const TransferFunction& function, const RayCastOptions& options,
+                        const Execution& execution) const;
 
     BrickTree tree_;
     std::vector<Brick> bricks_;  ///< by leaf

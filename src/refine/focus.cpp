@@ -28,6 +28,17 @@ Focus cameraFocus(const Camera& camera, double finestSpacingWorld) {
     const CameraView view = viewOf(camera);
     const Vec3d &forward = view.forward, &side = view.right, &up = view.up;
     const double wide = view.wide, high = view.high;
+    if (view.isParallel) {
+        // From so far away all that is seen is at one distance.
+        const double far = 0x1p20 * camera.heightWorld, pixel = camera.heightWorld / camera.heightPixels;
+        Focus focus = pointFocus(camera.eyeWorld - far * forward, far * finestSpacingWorld / pixel);
+        const auto add = [&](const Vec3d& normal, double before) {
+            focus.within.push_back({normal, glm::dot(normal, camera.eyeWorld) - before});
+        };
+        add(forward, 0);
+        for (const double sign : {-1.0, 1.0}) add(sign * side, wide), add(sign * up, high);
+        return focus;
+    }
     // At the distance r a pixel is as large as the finest spacing.
     Focus focus = pointFocus(camera.eyeWorld, finestSpacingWorld * camera.heightPixels / (2 * high));
     for (const Vec3d& normal :

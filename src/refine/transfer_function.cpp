@@ -37,6 +37,13 @@ std::array<double, 4> shownAt(const TransferFunction& function, double value) {
     return shownAs(between);
 }
 
+bool showsAny(const TransferFunction& function, double low, double high) {
+    if (shownAt(function, low)[3] > 0 || shownAt(function, high)[3] > 0) return true;
+    return std::any_of(function.stops.begin(), function.stops.end(), [&](const TransferFunction::Stop& stop) {
+        return stop.opacity > 0 && stop.value >= low && stop.value <= high;
+    });
+}
+
 void checkTransferFunction(const TransferFunction& function) {
     if (function.stops.empty()) throw InputError("a transfer function needs a stop");
     const auto isShare = [](double v) { return v >= 0 && v <= 1; };

@@ -60,7 +60,7 @@ TransferFunction evenly(double opacity) {
 }
 
 Vec3d directionOf(const Camera& camera, int x, int y) {
-    return viewOf(camera).directionOf(camera, x, y);
+    return viewOf(camera).rayOf(camera, x, y).direction;
 }
 
 /// Where a ray is in a box; begin > end where it isn't.

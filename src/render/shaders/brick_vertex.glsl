@@ -1,0 +1,20 @@
+// The boxes of bricks: the faces away from the eye are drawn, so that each pixel gets a fragment of a brick
+// once, from inside of it too.
+uniform vec3 forward, right, up;  // right and up over half the picture
+uniform bool isParallel;
+uniform vec4 tileFromPicture;  // scale and offset
+uniform int firstBrick;
+
+flat out int number;
+
+void main() {
+    const int corners[36] = int[](0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5, 0, 1, 5, 0, 5, 4,
+                                  2, 6, 7, 2, 7, 3, 0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6);
+    number = firstBrick + gl_InstanceID;
+    int corner = corners[gl_VertexID];
+    vec3 at = bricks[number].low + float(CELLS) * bricks[number].spacing *
+                                       vec3(corner & 1, corner >> 1 & 1, corner >> 2);
+    vec2 across = vec2(dot(at, right) / dot(right, right), dot(at, up) / dot(up, up));
+    float w = isParallel ? 1.0 : dot(at, forward);
+    gl_Position = vec4(across * tileFromPicture.xy + w * tileFromPicture.zw, 0.0, w);
+}

@@ -1,0 +1,395 @@
+#include "render/slice_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "base/timer.h"
+#include "gl/gl_program.h"
+#include "refine/camera_view.h"
+#include "render/shaders.h"
+#include "render/visibility_order.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+/// Rays along an edge of what is drawn at once.
+constexpr int kTile = 1024;
+constexpr std::size_t kMostClips = 32;
+/// Pixels are closed after so many parts of the bricks.
+constexpr std::size_t kParts = 12;
+constexpr std::size_t kFewBricks = 64;
+
+/// As the shaders have them.
+struct DeviceBrick {
+    std::array<float, 3> low;
+    float spacing;
+    std::array<std::int32_t, 3> texel;
+    std::int32_t isWhole;
+    float firstSlab;
+    std::array<float, 3> padding;
+};
+struct DeviceStop {
+    std::array<float, 4> shown;
+    float code;
+    std::array<float, 3> padding;
+};
+
+/// Bricks of one atlas that follow each other.
+struct Run {
+    int atlas = 0;
+    std::size_t first = 0, count = 0;
+};
+
+std::array<float, 3> floats(const Vec3d& v) {
+    return {float(v.x), float(v.y), float(v.z)};
+}
+
+/// What the picture's camera looks like from the bricks.
+class Scene {
+  public:
+    Scene(const BrickPool& pool, const BrickFrame& frame, const RenderOptions& options)
+        : pool_(pool), frame_(frame), options_(options), view_(viewOf(options.camera)) {
+        const Vec3d& eye = options.camera.eyeWorld;
+        for (const HalfSpace& half : options.within)
+            clips_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye)});
+        seen_ = clips_;
+        const double wide = view_.wide, high = view_.high;
+        seen_.push_back({view_.forward, 0});
+        for (const double sign : {-1.0, 1.0}) {
+            if (view_.isParallel) {
+                seen_.push_back({sign * view_.right, -wide});
+                seen_.push_back({sign * view_.up, -high});
+            } else {
+                seen_.push_back({wide * view_.forward + sign * view_.right, 0});
+                seen_.push_back({high * view_.forward + sign * view_.up, 0});
+            }
+        }
+    }
+
+    const CameraView& view() const { return view_; }
+    /// Relative to the eye.
+    const std::vector<HalfSpace>& clips() const { return clips_; }
+
+    bool isSeen(const PlacedBrick& brick) const {
+        if (!brick.isCovered || brick.range.empty()) return false;
+        // Rounded codes may lie a step beyond the range.
+        const double beyond = brick.range.width() / 64 + 1e-6 * std::abs(brick.range.max);
+        if (!showsAny(options_.function, brick.range.min - beyond, brick.range.max + beyond)) return false;
+        const Box3d box = fromEye(brick);
+        return std::none_of(seen_.begin(), seen_.end(), [&](const HalfSpace& half) {
+            const Vec3d& n = half.normalWorld;
+            const Vec3d farthest(n.x > 0 ? box.max.x : box.min.x, n.y > 0 ? box.max.y : box.min.y,
+                                 n.z > 0 ? box.max.z : box.min.z);
+            return glm::dot(n, farthest) < half.offsetWorld;
+        });
+    }
+
+    /// The bricks that are seen, the nearest first.
+    std::vector<const PlacedBrick*> inOrder(std::span<const PlacedBrick> bricks) const {
+        std::vector<const PlacedBrick*> seen;
+        std::vector<DepthKey> keys;
+        for (const PlacedBrick& brick : bricks)
+            if (isSeen(brick)) seen.push_back(&brick), keys.push_back(brick.key);
+        const double edge = frame_.rootSpacingWorld * frame_.cells;
+        const Viewpoint from{(options_.camera.eyeWorld - frame_.originWorld) / edge,
+                             view_.isParallel ? view_.forward : Vec3d(0)};
+        std::vector<const PlacedBrick*> ordered;
+        for (const std::size_t i : visibilityOrder(keys, from)) ordered.push_back(seen[i]);
+        return ordered;
+    }
+
+    DeviceBrick placed(const PlacedBrick& brick) const {
+        const Box3d box = fromEye(brick);
+        const Vec3i texel = pool_.layout().firstTexel(brick.slot);
+        const double spacing = frame_.spacingWorld(brick.key.depth);
+        double nearest = 0;
+        for (int a = 0; a < 3; ++a)
+            nearest += std::min(view_.forward[a] * box.min[a], view_.forward[a] * box.max[a]);
+        const double slab = spacing / options_.slicesAVoxel;
+        return {floats(box.min),
+                float(spacing),
+                {texel.x, texel.y, texel.z},
+                brick.isWhole,
+                float(std::floor(std::max(nearest, 0.0) / slab)),
+                {}};
+    }
+
+    std::vector<DeviceStop> stops() const {
+        const ValueCoding& coding = pool_.coding().codings()[std::size_t(options_.channel)];
+        std::vector<DeviceStop> stops;
+        for (const TransferFunction::Stop& stop : options_.function.stops)
+            stops.push_back(
+                {{float(stop.color[0]), float(stop.color[1]), float(stop.color[2]), float(stop.opacity)},
+                 float(coding.encode(stop.value)),
+                 {}});
+        return stops;
+    }
+
+  private:
+    Box3d fromEye(const PlacedBrick& brick) const {
+        const Box3d box = frame_.boxWorld(brick.key);
+        return {box.min - options_.camera.eyeWorld, box.max - options_.camera.eyeWorld};
+    }
+
+    const BrickPool& pool_;
+    const BrickFrame& frame_;
+    const RenderOptions& options_;
+    CameraView view_;
+    std::vector<HalfSpace> clips_, seen_;
+};
+
+/// A part of the picture, in rays from its top left.
+struct PictureTile {
+    int x = 0, y = 0, width = 0, height = 0;
+};
+
+void checkOptions(const BrickPool& pool, const RenderOptions& options) {
+    checkTransferFunction(options.function);
+    if (options.channel < 0 || options.channel >= pool.coding().channels())
+        throw InputError("the pool has no channel " + std::to_string(options.channel));
+    const auto isLength = [](double v) { return v > 0 && std::isfinite(v); };
+    if (!isLength(options.layerWorld) || !isLength(options.slicesAVoxel) || options.slicesAVoxel > 64)
+        throw InputError("slices need a layer of a length above 0, and between 0 and 64 of them a voxel");
+    const int rays = options.samplesAPixel;
+    if (rays != 1 && rays != 4 && rays != 9 && rays != 16)
+        throw InputError("a pixel has 1, 4, 9 or 16 rays, not " + std::to_string(rays));
+    if (options.within.size() > kMostClips) throw InputError("a picture has 32 clip planes at most");
+    for (const HalfSpace& half : options.within)
+        if (const double length = glm::length(half.normalWorld);
+            !isLength(length) || !std::isfinite(half.offsetWorld))
+            throw InputError("a clip plane needs a normal of a finite length above 0");
+}
+
+}  // namespace
+
+// All that OpenGL has; only its thread looks at it.
+struct SliceRenderer::Device {
+    std::optional<GlProgram> bricks, close;
+    int cells = 0;  // that `bricks` was made for
+    GlVertexArray vertices;
+    GlTexture color, depth;
+    GlFramebuffer target, closing;
+
+    void prepare(GlContext& context, int brickCells);
+    void setUniforms(const GlFunctions& gl, const Scene& scene, const RenderOptions& options) const;
+    void draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs, std::size_t brickCount,
+              const PictureTile& tile, const Vec3i& picture, std::size_t group, RenderCounts& counts) const;
+};
+
+void SliceRenderer::Device::prepare(GlContext& context, int brickCells) {
+    namespace text = shaders::render;
+    if (!bricks || cells != brickCells) {
+        bricks = makeProgram(context,
+                             {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kBrick}},
+                              {GL_FRAGMENT_SHADER, text::kBrickFragment, {text::kBrick}}},
+                             {{"CELLS", std::to_string(brickCells)}});
+        cells = brickCells;
+    }
+    if (!close)
+        close = makeProgram(
+            context, {{GL_VERTEX_SHADER, text::kCloseVertex}, {GL_FRAGMENT_SHADER, text::kCloseFragment}});
+    if (color) return;
+    Device made;
+    made.vertices = GlVertexArray(context);
+    made.color = GlTexture(context, GL_TEXTURE_2D, GL_RGBA32F, kTile, kTile);
+    made.depth = GlTexture(context, GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, kTile, kTile);
+    made.target = GlFramebuffer(context);
+    made.target.attach(GL_COLOR_ATTACHMENT0, made.color);
+    made.target.attach(GL_DEPTH_ATTACHMENT, made.depth);
+    made.target.throwIfIncomplete();
+    // Without the picture, which is read there.
+    made.closing = GlFramebuffer(context);
+    made.closing.attach(GL_DEPTH_ATTACHMENT, made.depth);
+    const GLenum none = GL_NONE;
+    context.functions().NamedFramebufferDrawBuffers(made.closing.id(), 1, &none);
+    made.closing.throwIfIncomplete();
+    vertices = std::move(made.vertices);
+    color = std::move(made.color), depth = std::move(made.depth);
+    target = std::move(made.target), closing = std::move(made.closing);
+}
+
+void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scene,
+                                        const RenderOptions& options) const {
+    const GLuint program = bricks->id();
+    const auto vector = [&](const char* name, const Vec3d& v) {
+        gl.ProgramUniform3f(program, bricks->uniform(name), float(v.x), float(v.y), float(v.z));
+    };
+    const auto number = [&](const char* name, double v) {
+        gl.ProgramUniform1f(program, bricks->uniform(name), float(v));
+    };
+    const CameraView& view = scene.view();
+    vector("forward", view.forward);
+    vector("right", view.wide * view.right);
+    vector("up", view.high * view.up);
+    gl.ProgramUniform1i(program, bricks->uniform("isParallel"), view.isParallel);
+    gl.ProgramUniform1i(program, bricks->uniform("component"), options.channel % kChannelsAGroup);
+    gl.ProgramUniform1i(program, bricks->uniform("clipCount"), int(scene.clips().size()));
+    std::vector<std::array<float, 4>> clips;
+    for (const HalfSpace& half : scene.clips()) {
+        // Of length 1, so that no product of floats over- or underflows.
+        const double length = glm::length(half.normalWorld);
+        const std::array<float, 3> n = floats(half.normalWorld / length);
+        clips.push_back({n[0], n[1], n[2], float(half.offsetWorld / length)});
+    }
+    if (!clips.empty())
+        gl.ProgramUniform4fv(program, bricks->uniform("clips"), int(clips.size()), clips[0].data());
+    number("slicesAVoxel", options.slicesAVoxel);
+    number("layersAWorldUnit", 1 / options.layerWorld);
+}
+
+void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs,
+                                 std::size_t brickCount, const PictureTile& tile, const Vec3i& picture,
+                                 std::size_t group, RenderCounts& counts) const {
+    const GlFunctions& gl = context.functions();
+    const GLuint program = bricks->id();
+    // Of a picture from -1 to 1, right and up.
+    const double wide = picture.x, high = picture.y;
+    const double left = tile.x, below = high - tile.y - tile.height;
+    gl.ProgramUniform4f(program, bricks->uniform("pictureFromPixel"), float(2 / wide), float(2 / high),
+                        float(2 * left / wide - 1), float(2 * below / high - 1));
+    gl.ProgramUniform4f(program, bricks->uniform("tileFromPicture"), float(wide / tile.width),
+                        float(high / tile.height), float((wide - 2 * left) / tile.width - 1),
+                        float((high - 2 * below) / tile.height - 1));
+    gl.Viewport(0, 0, tile.width, tile.height);
+    const std::array<float, 4> nothing{};
+    const float farthest = 1;
+    gl.ClearNamedFramebufferfv(target.id(), GL_COLOR, 0, nothing.data());
+    gl.ClearNamedFramebufferfv(target.id(), GL_DEPTH, 0, &farthest);
+    gl.BindVertexArray(vertices.id());
+    gl.Enable(GL_DEPTH_TEST);
+    gl.DepthFunc(GL_LESS);
+    gl.Enable(GL_CULL_FACE);
+    const auto drawBricks = [&] {
+        gl.BindFramebuffer(GL_FRAMEBUFFER, target.id());
+        gl.UseProgram(program);
+        gl.DepthMask(GL_FALSE);
+        gl.CullFace(GL_FRONT);
+        gl.Enable(GL_BLEND);
+        gl.BlendFuncSeparate(GL_ONE_MINUS_DST_ALPHA, GL_ONE, GL_ONE_MINUS_DST_ALPHA, GL_ONE);
+    };
+    const auto closePixels = [&] {
+        gl.BindFramebuffer(GL_FRAMEBUFFER, closing.id());
+        gl.UseProgram(close->id());
+        gl.BindTextureUnit(0, color.id());
+        gl.DepthMask(GL_TRUE);
+        gl.CullFace(GL_BACK);
+        gl.Disable(GL_BLEND);
+        gl.DrawArrays(GL_TRIANGLES, 0, 3);
+        ++counts.draws;
+    };
+    const std::size_t part = std::max(kFewBricks, brickCount / kParts);
+    std::size_t open = 0;
+    drawBricks();
+    for (const Run& run : runs) {
+        for (std::size_t done = 0; done < run.count;) {
+            const std::size_t count = std::min(run.count - done, part - open);
+            gl.BindTextureUnit(0, pool.codes(run.atlas, group).id());
+            gl.BindTextureUnit(1, pool.coverage(run.atlas, group).id());
+            gl.ProgramUniform1i(program, bricks->uniform("firstBrick"), int(run.first + done));
+            gl.DrawArraysInstanced(GL_TRIANGLES, 0, 36, GLsizei(count));
+            ++counts.draws;
+            done += count;
+            open += count;
+            if (open < part) continue;
+            open = 0;
+            closePixels();
+            drawBricks();
+        }
+    }
+}
+
+SliceRenderer::SliceRenderer(GlThread& thread)
+    : thread_(thread), device_(new Device, [&thread](Device* device) {
+          if (thread.isThisThread())
+              delete device;
+          else
+              thread.run([device](GlContext&) { delete device; });
+      }) {}
+
+SliceRenderer::~SliceRenderer() = default;
+
+RgbaImage SliceRenderer::draw(const BrickPool& pool, const BrickFrame& frame,
+                              std::span<const PlacedBrick> bricks, const RenderOptions& options,
+                              const Execution& execution, RenderCounts* counts) {
+    checkOptions(pool, options);
+    const Scene scene(pool, frame, options);
+    const std::vector<const PlacedBrick*> seen = scene.inOrder(bricks);
+    std::vector<DeviceBrick> placed;
+    std::vector<Run> runs;
+    for (const PlacedBrick* brick : seen) {
+        const int atlas = pool.layout().atlasOf(brick->slot);
+        if (runs.empty() || runs.back().atlas != atlas) runs.push_back({atlas, placed.size(), 0});
+        ++runs.back().count;
+        placed.push_back(scene.placed(*brick));
+    }
+    const std::vector<DeviceStop> stops = scene.stops();
+    const int side = int(std::lround(std::sqrt(options.samplesAPixel)));  // rays along a pixel's edge
+    RgbaImage image{options.camera.widthPixels, options.camera.heightPixels, {}};
+    image.pixels.resize(std::size_t(image.width) * std::size_t(image.height));
+    RenderCounts count;
+    count.bricks = std::int64_t(seen.size());
+    count.unseenBricks = std::int64_t(bricks.size() - seen.size());
+    if (seen.empty()) {
+        if (counts) *counts = count;
+        return image;
+    }
+
+    GlBuffer brickBuffer, stopBuffer;
+    const int pixelsATile = kTile / side;
+    const Vec3i picture(image.width * side, image.height * side, 1);
+    const std::size_t group = std::size_t(options.channel) / kChannelsAGroup;
+    std::vector<Rgba> rays;
+    // In tasks of a tile, so that others of the thread come between.
+    struct Uploaded {
+        GlBuffer bricks, stops;
+    };
+    const std::shared_ptr<Uploaded> uploaded(
+        new Uploaded, [this](Uploaded* buffers) { thread_.run([buffers](GlContext&) { delete buffers; }); });
+    thread_.run([&](GlContext& context) {
+        device_->prepare(context, pool.brickCells());
+        uploaded->bricks = GlBuffer(context, std::span(placed));
+        uploaded->stops = GlBuffer(context, std::span(stops));
+        count.deviceBytes = uploaded->bricks.bytes() + uploaded->stops.bytes() +
+                            std::int64_t(kTile) * kTile * std::int64_t(sizeof(Rgba) + sizeof(float));
+    });
+    for (int top = 0; top < image.height; top += pixelsATile)
+        for (int left = 0; left < image.width; left += pixelsATile) {
+            execution.throwIfCancelled();
+            const int wide = std::min(pixelsATile, image.width - left);
+            const int high = std::min(pixelsATile, image.height - top);
+            const PictureTile tile{left * side, top * side, wide * side, high * side};
+            rays.resize(std::size_t(tile.width) * std::size_t(tile.height));
+            thread_.run([&](GlContext& context) {
+                const GlFunctions& gl = context.functions();
+                const Timer timer;
+                device_->setUniforms(gl, scene, options);
+                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, uploaded->bricks.id());
+                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, uploaded->stops.id());
+                device_->draw(context, pool, runs, placed.size(), tile, picture, group, count);
+                gl.GetTextureSubImage(device_->color.id(), 0, 0, 0, 0, tile.width, tile.height, 1, GL_RGBA,
+                                      GL_FLOAT, GLsizei(rays.size() * sizeof(Rgba)), rays.data());
+                count.drawMs += timer.elapsedMs();
+            });
+            // Rows come from below.
+            for (int y = 0; y < high; ++y)
+                for (int x = 0; x < wide; ++x) {
+                    std::array<double, 4> sum{};
+                    for (int j = 0; j < side; ++j)
+                        for (int i = 0; i < side; ++i) {
+                            const std::size_t row = std::size_t(tile.height - 1 - (y * side + j));
+                            const Rgba& ray = rays[row * std::size_t(tile.width) + std::size_t(x * side + i)];
+                            for (std::size_t c = 0; c < 4; ++c) sum[c] += double(ray[c]);
+                        }
+                    Rgba& pixel = image.at(left + x, top + y);
+                    for (std::size_t c = 0; c < 4; ++c) pixel[c] = float(sum[c] / (side * side));
+                }
+        }
+    if (counts) *counts = count;
+    return image;
+}
+
+}  // namespace tessera

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "base/rgba_image.h"
+#include "pool/brick_pool.h"
+#include "render/placed_bricks.h"
+#include "tessera/execution.h"
+#include "tessera/focus.h"
+#include "tessera/transfer_function.h"
+
+namespace tessera {
+
+/// What a picture shows of a pool, and how well.
+struct RenderOptions {
+    Camera camera;
+    TransferFunction function;  ///< its field isn't looked at
+    int channel = 0;
+    /// A layer as thick as this has the opacity that the transfer function gives; world units, above 0.
+    double layerWorld = 1;
+    /// Slices to the spacing of the brick that they lie in; above 0.
+    double slicesAVoxel = 2;
+    /// Only what lies in all of these is shown; 32 at most.
+    std::vector<HalfSpace> within;
+    /// Rays a pixel, in a square: 1, 4, 9 or 16.
+    int samplesAPixel = 1;
+};
+
+struct RenderCounts {
+    std::int64_t bricks = 0;        ///< drawn
+    std::int64_t unseenBricks = 0;  ///< left out: beside the picture, or nothing of them is shown
+    std::int64_t draws = 0;
+    std::int64_t deviceBytes = 0;  ///< beside the pool
+    double drawMs = 0;  ///< until the picture is read back
+};
+
+/// Draws the bricks of a pool by slices across the view, composited from the front to the back.
+///
+/// The slices are slabs between planes across the view, counted from the eye: those of a brick are as thick
+/// as its spacing over slicesAVoxel, so slabs of all levels lie in one phase, finer ones half as thick as
+/// coarser ones. Where the ray of a pixel runs through slab and brick, for the length s, the value in the
+/// middle of that part stands for it: with the colour C and the opacity a of the transfer function there,
+/// A = 1 - (1 - a)^(s / layer) of the light is stopped, and C A added. So slices neither overlap nor leave
+/// gaps where bricks meet, of whatever levels, and an even medium has the opacity of the ray's length.
+///
+/// Only what lies in the mesh is drawn: where trilinear interpolation of the samples' coverage, 1 in the mesh
+/// and 0 outside, is at least a half, and all samples around that are covered have finite values. Values are
+/// interpolated in floats, not in the few steps of a device's filter. A pixel that lets less than a
+/// ten-thousandth of the light through is done.
+///
+/// A picture depends on the bricks and the options alone, not on their order.
+class SliceRenderer {
+  public:
+    /// The thread must outlive it.
+    explicit SliceRenderer(GlThread& thread);
+    ~SliceRenderer();
+    SliceRenderer(const SliceRenderer&) = delete;
+    SliceRenderer& operator=(const SliceRenderer&) = delete;
+
+    /// Red, green and blue are those of the transfer function times the opacity. The pool is one of this
+    /// thread; a state of it that shows the bricks is to be held. Throws InputError for options out of range,
+    /// GlError when the device fails or has no room, Cancelled.
+    RgbaImage draw(const BrickPool& pool, const BrickFrame& frame, std::span<const PlacedBrick> bricks,
+                   const RenderOptions& options, const Execution& execution, RenderCounts* counts = nullptr);
+
+  private:
+    struct Device;
+    GlThread& thread_;
+    std::shared_ptr<Device> device_;  // ends on the OpenGL thread
+};
+
+}  // namespace tessera

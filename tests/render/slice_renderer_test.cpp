@@ -1,0 +1,441 @@
+#include "render/slice_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <random>
+
+#include "brick_test_meshes.h"
+#include "gl_test_tools.h"
+#include "pictures/image.h"
+#include "reference/ray_cast.h"
+#include "refine/camera_view.h"
+#include "refine/plan_frame.h"
+#include "render/visibility_order.h"
+#include "schedule/brick_scheduler.h"
+#include "schedule/random_schedule.h"
+#include "software/software_resampler.h"
+#include "tessera/error.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kCells = 8;
+constexpr GlPlatform kPlatform = GlPlatform::eglSurfaceless;
+
+/// A mesh whose bricks follow a focus, in a pool, and what draws them.
+class Pictured {
+  public:
+    Pictured(TetMesh made, const std::function<double(const Vec3d&)>& field, const Focus& focus,
+             SampleFormat format = SampleFormat::r32f, int resolution = 129)
+        : mesh(std::move(made)) {
+        addPointField(mesh, "other", [](const Vec3d& p) { return p.x; });
+        addPointField(mesh, "f", field);
+        ScheduleOptions options;
+        options.refine.criterion = Criterion::focus;
+        options.refine.brickCells = kCells;
+        options.refine.resolution = resolution;
+        options.refine.focus = {focus};
+        options.budgetBytes = std::int64_t(1) << 28;
+        const PlanFrame plan = chooseFrame(mesh.boundsWorld(), options.refine);
+        frame = {plan.originWorld, plan.rootSpacingWorld, kCells};
+        PoolOptions poolOptions;
+        poolOptions.budgetBytes = std::int64_t(1) << 26;
+        pool = std::make_unique<BrickPool>(thread, kCells,
+                                           TexelCoding(codingsOf(mesh, fields, format), format), poolOptions);
+        target = std::make_unique<PoolTarget>(*pool, mesh, fields, 2);
+        scheduler = std::make_unique<BrickScheduler>(mesh, fields, resampler, options, *target);
+        scheduler->finish({.threads = 2});
+        bricks = placeBricks(*target, scheduler->tree().leaves(), 1, {.threads = 2});
+    }
+
+    RgbaImage draw(const RenderOptions& options, RenderCounts* counts = nullptr) {
+        return renderer.draw(*pool, frame, bricks, options, {}, counts);
+    }
+    /// What the pool was filled from, in double.
+    RayCaster caster() const {
+        const Depth finest = scheduler->tree().deepest();
+        const BrickTree tree =
+            scheduler->tree().brickTree(frame.originWorld, frame.rootSpacingWorld, kCells, finest);
+        std::vector<BrickPoints> points(tree.leafCount());
+        for (const GrowingLeaf& leaf : scheduler->tree().leaves()) {
+            const auto at = tree.findLeaf({levelOf(leaf.key.depth, finest), leaf.key.index});
+            const PointValues values =
+                target->bricks().valuesAt(leaf, target->bricks().closedPoints(leaf.key));
+            BrickPoints& brick = points[std::size_t(at)];
+            brick.covered = values.covered;
+            for (std::size_t p = 0; p < values.covered.size(); ++p)
+                brick.values.push_back(float(values.values[2 * p + 1]));
+        }
+        return {tree, std::move(points)};
+    }
+    int depths() const { return scheduler->tree().deepest().halvings() + 1; }
+
+    TetMesh mesh;
+    const std::vector<int> fields{0, 1};
+    BrickFrame frame;
+    SoftwareResampler resampler;
+    GlThread thread{kPlatform};
+    std::unique_ptr<BrickPool> pool;
+    std::unique_ptr<PoolTarget> target;
+    std::unique_ptr<BrickScheduler> scheduler;
+    SliceRenderer renderer{thread};
+    std::vector<PlacedBrick> bricks;
+};
+
+TransferFunction stops(std::vector<TransferFunction::Stop> all) {
+    return {.field = {}, .stops = std::move(all)};
+}
+TransferFunction even(double opacity) {
+    return stops({{0, {1, 0.5, 0.25}, opacity}});
+}
+/// Everything a little, with colours all along.
+TransferFunction thin() {
+    return stops({{-1, {0.1, 0.1, 0.8}, 0.02}, {0, {0.2, 0.9, 0.3}, 0.1}, {1, {1, 0.3, 0.1}, 0.3}});
+}
+/// A shell that hides what is behind it.
+TransferFunction opaque() {
+    return stops(
+        {{0.30, {0, 0, 1}, 0}, {0.36, {1, 0.8, 0.2}, 1}, {0.42, {1, 0, 0}, 0.9}, {0.48, {1, 1, 1}, 0}});
+}
+
+Camera lookAt(const Vec3d& eye, const Vec3d& at, int pixels, double degrees = 35) {
+    return {eye, at - eye, {0, 0, 1}, degrees, pixels, pixels};
+}
+
+double wave(const Vec3d& p) {
+    return 0.6 * std::sin(3 * p.x) * std::cos(2 * p.y) + 0.4 * p.z;
+}
+double radiusOf(const Vec3d& p) {
+    return glm::length(p);
+}
+
+int pixelsAsked() {
+    return asked("TESSERA_PICTURE_PIXELS", 96);
+}
+
+struct PictureCase {
+    const char* name;
+    Camera camera;
+    TransferFunction function;
+    bool isShell = false;  ///< the field of radii
+    std::vector<HalfSpace> within{};
+    SampleFormat format = SampleFormat::r32f;
+    double slicesAVoxel = 4;
+};
+void PrintTo(const PictureCase& scene, std::ostream* to) {
+    *to << scene.name;
+}
+
+std::vector<PictureCase> cases() {
+    const int n = pixelsAsked();
+    const Vec3d middle(0), far(5, -7, 4), near(1.1, -1.2, 0.7), inside(0.25, -0.2, 0.15);
+    Camera parallel = lookAt({3, 2, 4}, middle, n);
+    parallel.heightWorld = 2.4;
+    Camera parallelInside = lookAt({0.1, 0.1, 0.2}, {-1, -0.4, 0.1}, n);
+    parallelInside.heightWorld = 1.5;
+    const std::vector<HalfSpace> half{{{1, -0.5, 0.3}, 0.05}};
+    const std::vector<HalfSpace> box{{{1, 0, 0}, -0.4},  {{-1, 0, 0}, -0.5}, {{0, 1, 0}, -0.6},
+                                     {{0, -1, 0}, -0.3}, {{0, 0, 1}, -0.5},  {{0, 0, -1}, -0.4}};
+    return {
+        {"far_thin", lookAt(far, middle, n, 18), thin()},
+        {"far_opaque", lookAt(far, middle, n, 18), opaque(), true, {}, SampleFormat::r32f, 8},
+        {"near_thin", lookAt(near, middle, n, 60), thin()},
+        {"near_opaque", lookAt(near, middle, n, 60), opaque(), true, {}, SampleFormat::r32f, 8},
+        {"inside_thin", lookAt(inside, {-1, 0.3, 0}, n, 80), thin()},
+        {"inside_opaque", lookAt(inside, {-1, 0.3, 0}, n, 80), opaque(), true, {}, SampleFormat::r32f, 8},
+        {"on_an_axis", {{0, -4, 0}, {0, 1, 0}, {0, 0, 1}, 35, n, n}, thin()},
+        {"parallel_thin", parallel, thin()},
+        {"parallel_opaque", parallel, opaque(), true, {}, SampleFormat::r32f, 8},
+        {"parallel_inside", parallelInside, thin()},
+        {"half", lookAt(far, middle, n, 18), thin(), false, half},
+        {"half_opaque", lookAt(far, middle, n, 18), opaque(), true, half, SampleFormat::r32f, 8},
+        {"box", lookAt(near, middle, n, 60), thin(), false, box},
+        {"r16f", lookAt(near, middle, n, 60), thin(), false, {}, SampleFormat::r16f},
+        {"r8", lookAt(near, middle, n, 60), thin(), false, {}, SampleFormat::r8},
+        {"r8_opaque", lookAt(far, middle, n, 18), opaque(), true, half, SampleFormat::r8, 8},
+    };
+}
+
+/// Largest difference of pixels further than one pixel from where the reference's opacity or colour steps, as
+/// at silhouettes: from one pixel to the next by more than a tenth.
+double largestAwayFromEdges(const RgbaImage& image, const RgbaImage& reference) {
+    const auto differs = [&](int x, int y, int i, int j) {
+        for (std::size_t c = 0; c < 4; ++c)
+            if (std::abs(reference.at(x, y)[c] - reference.at(i, j)[c]) > 0.1f) return true;
+        return false;
+    };
+    double largest = 0;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            bool isEdge = false;
+            for (int j = std::max(0, y - 1); j <= std::min(image.height - 1, y + 1); ++j)
+                for (int i = std::max(0, x - 1); i <= std::min(image.width - 1, x + 1); ++i)
+                    isEdge = isEdge || differs(x, y, i, j);
+            if (isEdge) continue;
+            for (std::size_t c = 0; c < 3; ++c)
+                largest = std::max(largest, double(std::abs(image.at(x, y)[c] - reference.at(x, y)[c])));
+        }
+    return largest;
+}
+
+void keep(const char* name, const char* which, const RgbaImage& image) {
+    // TESSERA_KEEP_PICTURES names a folder to look at them.
+    if (const char* folder = std::getenv("TESSERA_KEEP_PICTURES"))
+        writePng(std::string(folder) + "/" + name + "_" + which + ".png",
+                 overGround(image, {0.15, 0.15, 0.2}));
+}
+
+class SliceRendererCase : public testing::TestWithParam<PictureCase> {};
+
+// TESSERA_PICTURE_PIXELS asks for larger pictures.
+TEST_P(SliceRendererCase, IsThePictureOfRaysThroughTheSameSlabs) {
+    TESSERA_NEEDS_GL(kPlatform);
+    const PictureCase& scene = GetParam();
+    Pictured pictured(ballMesh(5, 1), scene.isShell ? radiusOf : wave, pointFocus({0.4, -0.3, 0.2}, 0.12),
+                      scene.format);
+    EXPECT_GE(pictured.depths(), 3);
+    RenderOptions options;
+    options.camera = scene.camera;
+    options.function = scene.function;
+    options.channel = 1;
+    options.layerWorld = 0.1;
+    options.slicesAVoxel = scene.slicesAVoxel;
+    options.within = scene.within;
+    RenderCounts counts;
+    const RgbaImage image = pictured.draw(options, &counts);
+    const RayCaster caster = pictured.caster();
+    const Execution execution{.threads = 2};
+    RayCastOptions rays{.layerWorld = options.layerWorld, .slicesAVoxel = options.slicesAVoxel};
+    const RgbaImage same = caster.draw(scene.camera, scene.within, scene.function, rays, execution);
+    rays.slicesAVoxel = 0;
+    rays.stepVoxels = 1.0 / 32;
+    const RgbaImage converged = caster.draw(scene.camera, scene.within, scene.function, rays, execution);
+    keep(scene.name, "slices", image);
+    keep(scene.name, "rays", same);
+
+    const auto pixels = std::int64_t(image.pixels.size());
+    const double rms = 255 * differenceOf(image, same).rms(pixels);
+    const double largest = 255 * largestAwayFromEdges(image, same);
+    const double toConverged = 255 * differenceOf(image, converged).rms(pixels);
+    std::printf(
+        "%-16s same slabs: RMS %.3f, largest %.2f of 255; converged: RMS %.3f; %lld bricks, %.0f ms\n",
+        scene.name, rms, largest, toConverged, static_cast<long long>(counts.bricks), counts.drawMs);
+    EXPECT_LT(rms, 1);
+    EXPECT_LT(largest, 12);
+    EXPECT_LT(toConverged, 2);
+    double opacity = 0;
+    for (const Rgba& pixel : image.pixels) opacity += double(pixel[3]);
+    EXPECT_GT(opacity / double(pixels), 0.05) << "there is something to see";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SliceRendererCase, testing::ValuesIn(cases()),
+                         [](const testing::TestParamInfo<PictureCase>& param) { return param.param.name; });
+
+TEST(SliceRenderer, AnEvenMediumHasTheOpacityOfTheRaysLengthInAnyLayout) {
+    TESSERA_NEEDS_GL(kPlatform);
+    // A box whose faces lie on the points of all lattices, so that the path is known.
+    TetMesh mesh = gridMesh({3, 3, 3}, Vec3d(0), Vec3d(1));
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> share(0, 1);
+    double worst = 0;
+    int seen = 0, depths = 0;
+    for (int layout = 0; layout < 20; ++layout) {
+        const double x = share(random), y = share(random), z = share(random);
+        Pictured pictured(
+            mesh, [](const Vec3d&) { return 1.0; }, pointFocus({x, y, z}, 0.02 + 0.1 * share(random)),
+            SampleFormat::r32f, layout % 2 == 0 ? 65 : 257);
+        depths = std::max(depths, pictured.depths());
+        RenderOptions options;
+        options.camera = lookAt({2.3, -1.7, 1.9}, Vec3d(0.5), 48, 40);
+        if (layout % 5 == 4) options.camera.heightWorld = 2;
+        options.function = even(0.4);
+        options.channel = 1;
+        options.layerWorld = 0.3;
+        options.slicesAVoxel = 1;
+        for (int a = 0; a < 3; ++a) {
+            Vec3d axis(0);
+            axis[a] = 1;
+            options.within.push_back({axis, 0});
+            options.within.push_back({-axis, -1});
+        }
+        const RgbaImage image = pictured.draw(options);
+        const CameraView view = viewOf(options.camera);
+        for (int row = 0; row < image.height; ++row)
+            for (int column = 0; column < image.width; ++column) {
+                const ViewRay ray = view.rayOf(options.camera, column, row);
+                double begin = 0, end = 1e9;
+                for (int a = 0; a < 3; ++a) {
+                    const double low = -ray.originWorld[a] / ray.direction[a],
+                                 high = (1 - ray.originWorld[a]) / ray.direction[a];
+                    begin = std::max(begin, std::min(low, high));
+                    end = std::min(end, std::max(low, high));
+                }
+                const double path = std::max(0.0, end - begin);
+                const double alpha = 1 - std::pow(0.6, path / options.layerWorld);
+                worst = std::max(worst, std::abs(alpha - double(image.at(column, row)[3])));
+                worst = std::max(worst, std::abs(alpha / 2 - double(image.at(column, row)[1])));
+                seen += path > 0;
+            }
+    }
+    std::printf("an even medium in 20 layouts: at most %.4f of 255 from the closed form\n", 255 * worst);
+    EXPECT_LT(worst, 1.0 / 255);
+    EXPECT_GT(seen, 5000);
+    EXPECT_GE(depths, 3);
+}
+
+TEST(SliceRenderer, PicturesDependOnBricksAndOptionsAlone) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Pictured pictured(ballMesh(5, 1), wave, pointFocus({0.4, -0.3, 0.2}, 0.12));
+    RenderOptions options;
+    options.camera = lookAt({1.5, -2.5, 1.2}, Vec3d(0), 64);
+    options.function = thin();
+    options.channel = 1;
+    options.layerWorld = 0.1;
+    const RgbaImage image = pictured.draw(options);
+    std::mt19937 random(4);
+    std::shuffle(pictured.bricks.begin(), pictured.bricks.end(), random);
+    EXPECT_EQ(pictured.draw(options).pixels, image.pixels);
+    // A picture of many parts, each pixel the mean of its rays.
+    options.samplesAPixel = 16;
+    options.camera.widthPixels = options.camera.heightPixels = 280;
+    const RgbaImage large = pictured.draw(options);
+    Camera fine = options.camera;
+    fine.widthPixels = fine.heightPixels = 1120;
+    RenderOptions single = options;
+    single.samplesAPixel = 1;
+    single.camera = fine;
+    const RgbaImage rays = pictured.draw(single);
+    double worst = 0;
+    for (int y = 0; y < 280; ++y)
+        for (int x = 0; x < 280; ++x) {
+            double sum = 0;
+            for (int j = 0; j < 4; ++j)
+                for (int i = 0; i < 4; ++i) sum += double(rays.at(4 * x + i, 4 * y + j)[0]);
+            worst = std::max(worst, std::abs(sum / 16 - double(large.at(x, y)[0])));
+        }
+    EXPECT_LT(worst, 1e-5);
+}
+
+TEST(SliceRenderer, LeavesOutBricksOfWhichNothingIsShown) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Pictured pictured(ballMesh(5, 1), radiusOf, pointFocus({0.4, -0.3, 0.2}, 0.12));
+    RenderOptions options;
+    options.camera = lookAt({1.5, -2.5, 1.2}, Vec3d(0), 32);
+    options.channel = 1;
+    options.function = even(0.5);
+    RenderCounts all, few, none;
+    pictured.draw(options, &all);
+    EXPECT_EQ(std::size_t(all.bricks + all.unseenBricks), pictured.bricks.size());
+    options.function = stops({{0.3, {1, 1, 1}, 0.5}, {0.3, {1, 1, 1}, 0}});
+    pictured.draw(options, &few);
+    EXPECT_GT(few.bricks, 0);
+    EXPECT_LT(few.bricks, all.bricks / 4);
+    options.camera.forwardWorld = -options.camera.forwardWorld;
+    for (const Rgba& pixel : pictured.draw(options, &none).pixels) EXPECT_EQ(pixel, Rgba{});
+    EXPECT_EQ(none.bricks, 0);
+}
+
+TEST(SliceRenderer, ValuesThatAreNotFiniteAreNotShown) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Pictured pictured(
+        ballMesh(3, 1), [](const Vec3d& p) { return p.x > 0 ? NAN : 1.0; },
+        pointFocus({0.4, -0.3, 0.2}, 0.12));
+    RenderOptions options;
+    options.camera = {{0, -4, 0}, {0, 1, 0}, {0, 0, 1}, 30, 33, 33};
+    options.channel = 1;
+    options.function = even(0.5);
+    options.layerWorld = 0.2;
+    const RgbaImage image = pictured.draw(options);
+    EXPECT_GT(image.at(10, 16)[3], 0.9f);
+    EXPECT_EQ(image.at(22, 16)[3], 0);
+}
+
+TEST(SliceRenderer, RefusesOptionsOutOfRange) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Pictured pictured(gridMesh({1, 1, 1}, Vec3d(0), Vec3d(1)), wave, pointFocus(Vec3d(0), 1),
+                      SampleFormat::r32f, 17);
+    RenderOptions good;
+    good.camera = lookAt({2, 3, 4}, Vec3d(0.5), 8);
+    good.function = even(0.5);
+    const auto refuses = [&](const auto& change) {
+        RenderOptions bad = good;
+        change(bad);
+        EXPECT_THROW(pictured.draw(bad), InputError);
+    };
+    EXPECT_NO_THROW(pictured.draw(good));
+    refuses([](RenderOptions& o) { o.channel = 2; });
+    refuses([](RenderOptions& o) { o.layerWorld = 0; });
+    refuses([](RenderOptions& o) { o.slicesAVoxel = NAN; });
+    refuses([](RenderOptions& o) { o.samplesAPixel = 2; });
+    refuses([](RenderOptions& o) { o.within.resize(33); });
+    refuses([](RenderOptions& o) { o.within = {{Vec3d(0), 1}}; });
+    refuses([](RenderOptions& o) { o.function.stops.clear(); });
+    refuses([](RenderOptions& o) { o.camera.upWorld = o.camera.forwardWorld; });
+}
+
+TEST(VisibilityOrder, NoBrickHidesOneBeforeIt) {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> share(0, 1);
+    std::int64_t hidden = 0;
+    for (int round = 0; round < 40; ++round) {
+        std::vector<DepthKey> leaves;
+        const std::function<void(const DepthKey&)> grow = [&](const DepthKey& key) {
+            if (key.depth < Depth(3) && share(random) < 0.5) {
+                for (unsigned c = 0; c < 8; ++c) grow(childKey(key, c));
+            } else if (share(random) < 0.8) {
+                leaves.push_back(key);
+            }
+        };
+        for (int n = 0; n < 18; ++n) grow({Depth(0), {n % 3 - 1, n / 3 % 3 - 2, n / 9}});
+        std::shuffle(leaves.begin(), leaves.end(), random);
+        Viewpoint from;
+        for (int a = 0; a < 3; ++a) from.place[a] = 6 * share(random) - 3;
+        if (round % 4 == 3)
+            for (int a = 0; a < 3; ++a)
+                from.direction[a] = round % 8 == 7 && a == 1 ? 0 : share(random) - 0.5;
+        const std::vector<std::size_t> order = visibilityOrder(leaves, from);
+        ASSERT_EQ(order.size(), leaves.size());
+        std::vector<std::size_t> rank(leaves.size());
+        for (std::size_t i = 0; i < order.size(); ++i) rank[order[i]] = i;
+        const auto boxOf = [&](const DepthKey& key) {
+            const double edge = std::ldexp(1.0, -key.depth.halvings());
+            return Box3d{Vec3d(key.index) * edge, Vec3d(key.index + 1) * edge};
+        };
+        // Rays through two bricks meet the one that comes first in the order first.
+        for (int ray = 0; ray < 1000; ++ray) {
+            Vec3d origin = from.place, direction = from.direction;
+            if (direction == Vec3d(0))
+                for (int a = 0; a < 3; ++a) direction[a] = share(random) - 0.5;
+            else
+                for (int a = 0; a < 3; ++a) origin[a] = 4 * share(random) - 2 - 8 * direction[a];
+            std::vector<std::pair<double, std::size_t>> met;
+            for (std::size_t leaf = 0; leaf < leaves.size(); ++leaf) {
+                const Box3d box = boxOf(leaves[leaf]);
+                double begin = 0, end = 1e9;
+                for (int a = 0; a < 3; ++a) {
+                    if (direction[a] == 0) {
+                        if (origin[a] <= box.min[a] || origin[a] >= box.max[a]) end = -1;
+                        continue;
+                    }
+                    const double low = (box.min[a] - origin[a]) / direction[a],
+                                 high = (box.max[a] - origin[a]) / direction[a];
+                    begin = std::max(begin, std::min(low, high));
+                    end = std::min(end, std::max(low, high));
+                }
+                if (begin + 1e-9 < end) met.emplace_back(begin, rank[leaf]);
+            }
+            std::sort(met.begin(), met.end());
+            for (std::size_t i = 1; i < met.size(); ++i) ASSERT_LT(met[i - 1].second, met[i].second);
+            hidden += std::int64_t(met.size()) - 1;
+        }
+    }
+    EXPECT_GT(hidden, 10000);
+}
+
+}  // namespace
+}  // namespace tessera
