@@ -371,6 +371,33 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
     command.footer("Example:\n  tessera tets mesh.vtu -o tets.vtu");
 }
 
+void addRenderOptions(CLI::App& command, RenderArguments& a) {
+    command.add_option("vdb", a.request.input, "a .vdb file that tessera wrote")->required();
+    command
+        .add_option("-o,--output", a.request.output,
+                    "the picture: .png, or .exr with light and opacity as floats; - for a .png to standard "
+                    "output")
+        ->required();
+    command.add_option(
+        "--scene", a.request.scene,
+        "a JSON file with camera, transfer function, clips and more (default: all of the data, "
+        "opacities by how rare values are)");
+    command.add_option("--field", a.request.field, "the field (default: the scene's, or the first)");
+    command
+        .add_option("--component", a.request.component,
+                    "component of a vector, counted from 0 (default: the scene's, or its length)")
+        ->check(CLI::Range(0, 8));
+    command.add_option("--size", a.size, "pixels, such as 1920x1080 (default: the scene's, or 1024x768)");
+    command.add_option("--samples", a.request.samplesAPixel, "rays a pixel (default: the scene's, or 4)")
+        ->check(CLI::IsMember({1, 4, 9, 16}));
+    command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
+        ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
+    addCommonOptions(command, a.common);
+    command.footer(
+        "Examples:\n  tessera render flow.vdb -o flow.png\n"
+        "  tessera render flow.vdb --scene scene.json -o flow.png --size 1920x1080 --samples 9");
+}
+
 void addPictureOptions(CLI::App& command, PictureArguments& a) {
     command.add_option("vdb", a.request.input, "a .vdb file that tessera wrote")->required();
     command.add_option("-o,--output", a.request.output, "the .png file; - for standard output")->required();
@@ -608,6 +635,7 @@ void describe(CLI::App& app, CommandLine& line) {
     addCommand(app, line, "tets", "write the tetrahedra that a mesh is split into", addTetsOptions, runTets);
     addCommand(app, line, "picture", "draw one slice of a .vdb file as a .png", addPictureOptions,
                runPicture);
+    addCommand(app, line, "render", "draw a .vdb file's volume: a .png or .exr", addRenderOptions, runRender);
     addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
                addCompareOptions, runCompare);
     addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",

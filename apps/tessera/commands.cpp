@@ -74,6 +74,16 @@ int runPicture(const PictureArguments& a) {
     return 0;
 }
 
+int runRender(const RenderArguments& a) {
+    RenderRequest request = a.request;
+    refuseReaderBounds(a.common.reader, request.input + " is no mesh");
+    if (!a.size.empty()) request.size = parsePictureSize("--size", a.size);
+    if (!a.gl.empty()) request.platform = parseGlPlatform(a.gl);
+    Session session(a.common, request.output);
+    session.writeReport(renderedJson(request, renderVdb(request, session.job)));
+    return 0;
+}
+
 int runSlice(const SliceArguments& a) {
     CutRequest request = a.request;
     request.cut = cutOptions(a);

@@ -9,6 +9,7 @@
 #include "job/export_tets.h"
 #include "job/focus_trace.h"
 #include "job/paper_tables.h"
+#include "job/render_vdb.h"
 #include "job/verify_file.h"
 #include "options.h"
 
@@ -34,6 +35,11 @@ struct PictureArguments {
     CommonOptions common;
     std::string bounds, range, axis = "z";
     DrawRequest request;
+};
+struct RenderArguments {
+    CommonOptions common;
+    std::string size, gl;
+    RenderRequest request;
 };
 struct SliceArguments {
     CommonOptions common;
@@ -68,6 +74,7 @@ int runInfo(const InfoArguments& arguments);
 int runVerify(const VerifyArguments& arguments);
 int runTets(const TetsArguments& arguments);
 int runPicture(const PictureArguments& arguments);
+int runRender(const RenderArguments& arguments);
 int runCompare(const CompareArguments& arguments);
 int runPaperTables(const PaperTablesArguments& arguments);
 int runSlice(const SliceArguments& arguments);

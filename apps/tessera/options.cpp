@@ -317,6 +317,22 @@ Vec3d parseVector(const std::string& option, const std::string& text) {
     return {v[0], v[1], v[2]};
 }
 
+std::array<int, 2> parsePictureSize(const std::string& option, const std::string& text) {
+    constexpr int kMost = 32768;
+    const std::size_t cross = std::min(text.find('x'), text.size());
+    std::array<int, 2> size{};
+    const char* const ends[] = {text.data() + cross, text.data() + text.size()};
+    const char* from = text.data();
+    for (std::size_t i = 0; i < 2; ++i) {
+        const auto [end, failure] = std::from_chars(from, ends[i], size[i]);
+        require(cross < text.size() && failure == std::errc{} && end == ends[i] && size[i] >= 1 &&
+                    size[i] <= kMost,
+                fmt::format("{}: expected WIDTHxHEIGHT, each from 1 to {}, got '{}'", option, kMost, text));
+        from = end + 1;
+    }
+    return size;
+}
+
 Box3d parseBounds(const std::string& text) {
     const std::vector<double> v = parseNumbers("--bounds", text, 6);
     const Box3d box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};

@@ -84,6 +84,8 @@ std::vector<FieldChoice> parseFields(const std::string& text);
 std::vector<double> parseNumbers(const std::string& option, const std::string& text, std::size_t count);
 /// "a,b" with a < b. Throws InputError naming `option`.
 std::array<double, 2> parseRange(const std::string& option, const std::string& text);
+/// "1920x1080", from 1 to 32768 each. Throws InputError naming `option`.
+std::array<int, 2> parsePictureSize(const std::string& option, const std::string& text);
 /// "x,y,z". Throws InputError naming `option`.
 Vec3d parseVector(const std::string& option, const std::string& text);
 /// "x0,y0,z0,x1,y1,z1". Throws InputError.

@@ -113,14 +113,14 @@ ColourRange chooseRange(const ScalarImage& image, const PictureOptions& options)
     return range.empty() ? ColourRange{} : ColourRange{range.min, range.max};
 }
 
-// Labels of evenly spaced ticks, with the fewest digits that tell them apart.
-std::vector<std::string> tickLabels(const ColourRange& range) {
+// Labels of ticks, with the fewest digits that tell them apart. @param valueAt of a share from 0 to 1.
+std::vector<std::string> tickLabels(const ColourRange& range, const std::function<double(double)>& valueAt) {
     std::vector<std::string> labels;
     for (int digits = 3; digits <= 9; ++digits) {
         labels.clear();
         for (int t = 0; t < kTicks; ++t) {
             std::array<char, 40> text{};
-            double value = range.min + (range.max - range.min) * t / (kTicks - 1);
+            double value = valueAt(double(t) / (kTicks - 1));
             // The rounding of a tick at zero must not show as 1e-17.
             if (std::abs(value) < 1e-12 * (range.max - range.min)) value = 0;
             std::snprintf(text.data(), text.size(), "%.*g", digits, value);
@@ -150,11 +150,19 @@ void drawValues(RgbImage& canvas, int left, int top, const ScalarImage& image, c
         }
 }
 
-void drawBar(RgbImage& canvas, int left, int top, int height, const std::vector<std::string>& labels) {
+int widestOf(const std::vector<std::string>& labels) {
+    int width = 0;
+    for (const std::string& label : labels) width = std::max(width, textWidth(label));
+    return width;
+}
+
+/// @param colourAt of a share from 0 to 1.
+void drawBar(RgbImage& canvas, int left, int top, int height, const std::vector<std::string>& labels,
+             const std::function<Rgb(double)>& colourAt) {
     fillBox(canvas, left - 1, top - 1, kBarWidth + 2, height + 2, kInk);
     for (int y = 0; y < height; ++y)
         fillBox(canvas, left, top + y, kBarWidth, 1,
-                mapColour(height > 1 ? 1 - double(y) / (height - 1) : 0.5));
+                colourAt(height > 1 ? 1 - double(y) / (height - 1) : 0.5));
     const int count = int(labels.size());
     for (int t = 0; t < count; ++t) {
         const int y = count == 1 ? top + height / 2 : top + (height - 1) * (count - 1 - t) / (count - 1);
@@ -197,9 +205,9 @@ RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options) {
                   "outlines have the picture's size");
     const int magnify = std::max(1, options.magnify);
     const ColourRange range = chooseRange(image, options);
-    const std::vector<std::string> labels = tickLabels(range);
-    int labelWidth = 0;
-    for (const std::string& label : labels) labelWidth = std::max(labelWidth, textWidth(label));
+    const std::vector<std::string> labels =
+        tickLabels(range, [&](double share) { return range.min + (range.max - range.min) * share; });
+    const int labelWidth = widestOf(labels);
     const int titleHeight = options.title.empty() ? 0 : kGlyphHeight * kTextScale + kMargin;
     const int innerWidth = image.width * magnify,
               innerHeight = std::max(image.height * magnify, kSmallestHeight);
@@ -210,7 +218,7 @@ RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options) {
     const int top = kMargin + titleHeight;
     drawText(canvas, kMargin, kMargin, options.title);
     drawValues(canvas, kMargin, top, image, range, magnify);
-    drawBar(canvas, barLeft, top, innerHeight, labels);
+    drawBar(canvas, barLeft, top, innerHeight, labels, mapColour);
     return canvas;
 }
 
@@ -223,6 +231,26 @@ RgbImage overGround(const RgbaImage& image, const std::array<double, 3>& ground)
             result.rgb.push_back(std::uint8_t(std::lround(255 * std::clamp(value, 0.0, 1.0))));
         }
     return result;
+}
+
+bool putLegend(RgbImage& picture, const LegendOptions& options,
+               const std::function<Rgb(double value)>& colourAt) {
+    const auto valueAt = [&](double share) {
+        return options.isLogarithmic ? options.min * std::pow(options.max / options.min, share)
+                                     : options.min + share * (options.max - options.min);
+    };
+    const std::vector<std::string> labels = tickLabels({options.min, options.max}, valueAt);
+    const int titleHeight = options.title.empty() ? 0 : kGlyphHeight * kTextScale + kMargin;
+    const int width = std::max(kBarWidth + 10 + widestOf(labels), textWidth(options.title)) + 2 * kMargin;
+    const int barHeight = std::min(picture.height / 2, 400);
+    const int height = barHeight + titleHeight + 2 * kMargin;
+    if (barHeight < kSmallestHeight || width + 2 * kMargin > picture.width) return false;
+    const int left = picture.width - width - kMargin, top = (picture.height - height) / 2;
+    fillBox(picture, left, top, width, height, kPaper);
+    drawText(picture, left + kMargin, top + kMargin, options.title);
+    drawBar(picture, left + kMargin, top + kMargin + titleHeight, barHeight, labels,
+            [&](double share) { return colourAt(valueAt(share)); });
+    return true;
 }
 
 void writePng(const std::string& path, const RgbImage& image) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -57,6 +58,17 @@ RgbImage drawPicture(const ScalarImage& image, const PictureOptions& options);
 
 /// A picture before a ground of one colour, red, green and blue from 0 to 1.
 RgbImage overGround(const RgbaImage& image, const std::array<double, 3>& ground);
+
+/// What a colour bar tells.
+struct LegendOptions {
+    std::string title;
+    double min = 0, max = 1;     ///< at its ends
+    bool isLogarithmic = false;  ///< equal factors of the value take equal parts of the bar
+};
+/// Puts a colour bar with labelled ticks onto the right of a picture, on paper of its own. @param colourAt of
+/// a value. False, and nothing is put, when the picture has no room for it.
+bool putLegend(RgbImage& picture, const LegendOptions& options,
+               const std::function<Rgb(double value)>& colourAt);
 
 /// Throws IoError; nothing stands at `path` until the file is whole.
 void writePng(const std::string& path, const RgbImage& image);

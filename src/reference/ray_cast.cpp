@@ -130,8 +130,19 @@ class RayCaster::Ray {
         const Vec3d first = Vec3d(key.index) * double(tree_.brickCells());
         const double spacing = tree_.spacingWorld(key.level);
         const Brick& brick = caster_.bricks_[leaf];
+        const auto localAt = [&](double at) { return (eye_ + at * direction_) * voxels - first; };
+        const auto coverAt = [&](double at) {
+            return way_.isOutlinedBySamples ? coverageAt(brick, localAt(at)) - 0.5 : 0.5;
+        };
+        double cover = coverAt(begin);
+        // Of a step that the surface runs through the part in the mesh counts, coverage taken as linear.
         const auto step = [&](double from, double to) {
-            add(brick, (eye_ + 0.5 * (from + to) * direction_) * voxels - first, to - from);
+            const double coverNext = coverAt(to);
+            const double crossing = from + std::clamp(cover / (cover - coverNext), 0.0, 1.0) * (to - from);
+            const bool isInside = std::max(cover, coverNext) >= 0;
+            const double in = cover < 0 ? crossing : from, out = coverNext < 0 ? crossing : to;
+            cover = coverNext;
+            if (isInside && out > in) show(valueAt(brick, localAt(0.5 * (in + out))), out - in);
         };
         if (way_.options.slicesAVoxel > 0) {
             const double slab = spacing / way_.options.slicesAVoxel / depthALength_;
@@ -149,22 +160,23 @@ class RayCaster::Ray {
             step(begin + i * length, begin + (i + 1) * length);
     }
 
-    void add(const Brick& brick, const Vec3d& local, double stepWorld) {
+    template <class At>
+    double interpolate(const Vec3d& local, const At& at) const {
         const CellPlace place = locateInBrick(local, tree_.brickCells());
         const std::size_t n = std::size_t(tree_.brickCells()) + 1;
         const std::size_t corner =
             (std::size_t(place.cell.z) * n + std::size_t(place.cell.y)) * n + std::size_t(place.cell.x);
         const Vec3d& t = place.fraction;
-        const auto interpolate = [&](const auto& at) {
-            const auto row = [&](std::size_t offset) {
-                return glm::mix(double(at(corner + offset)), double(at(corner + offset + 1)), t.x);
-            };
-            return glm::mix(glm::mix(row(0), row(n), t.y), glm::mix(row(n * n), row(n * n + n), t.y), t.z);
+        const auto row = [&](std::size_t offset) {
+            return glm::mix(double(at(corner + offset)), double(at(corner + offset + 1)), t.x);
         };
-        if (way_.isOutlinedBySamples &&
-            interpolate([&](std::size_t p) { return brick.covered[p] ? 1.0 : 0.0; }) < 0.5)
-            return;
-        show(interpolate([&](std::size_t p) { return brick.values[p]; }), stepWorld);
+        return glm::mix(glm::mix(row(0), row(n), t.y), glm::mix(row(n * n), row(n * n + n), t.y), t.z);
+    }
+    double coverageAt(const Brick& brick, const Vec3d& local) const {
+        return interpolate(local, [&](std::size_t p) { return brick.covered[p] ? 1.0 : 0.0; });
+    }
+    double valueAt(const Brick& brick, const Vec3d& local) const {
+        return interpolate(local, [&](std::size_t p) { return brick.values[p]; });
     }
 
     void show(double value, double stepWorld) {

@@ -34,7 +34,7 @@ struct RenderCounts {
     std::int64_t unseenBricks = 0;  ///< left out: beside the picture, or nothing of them is shown
     std::int64_t draws = 0;
     std::int64_t deviceBytes = 0;  ///< beside the pool
-    double drawMs = 0;  ///< until the picture is read back
+    double drawMs = 0;             ///< until the picture is read back
 };
 
 /// Draws the bricks of a pool by slices across the view, composited from the front to the back.
@@ -47,7 +47,9 @@ struct RenderCounts {
 /// gaps where bricks meet, of whatever levels, and an even medium has the opacity of the ray's length.
 ///
 /// Only what lies in the mesh is drawn: where trilinear interpolation of the samples' coverage, 1 in the mesh
-/// and 0 outside, is at least a half, and all samples around that are covered have finite values. Values are
+/// and 0 outside, is at least a half, and all samples around that are covered have finite values. A slab that
+/// the surface runs through counts for the part before or behind it, the coverage taken as linear between its
+/// planes: there are no terraces along the surface. Values are
 /// interpolated in floats, not in the few steps of a device's filter. A pixel that lets less than a
 /// ten-thousandth of the light through is done.
 ///

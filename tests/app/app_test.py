@@ -23,6 +23,7 @@ import tempfile
 import termios
 import time
 import unittest
+import zlib
 
 from forked_tessera import ForkedTessera
 
@@ -1080,6 +1081,151 @@ class Refinement(AppTest):
         self.write("no.log", "text of somebody's")
         self.reject(2, "no.log log", *command("other.vdb", "no.log"))
         self.assertEqual((self.folder / "no.log").read_text(), "text of somebody's")
+
+
+class Pictures(AppTest):
+    """tessera render."""
+
+    def setUp(self):
+        super().setUp()
+        self.vdb = self.folder / "cube.vdb"
+        self.succeed("resample", self.cube, "-o", self.vdb, "--refine", "uniform", "--resolution", "17", "--brick-size", "8", "--extend", "1", "--quiet")
+
+    def render(self, *options, size="400x320"):
+        return self.report("render", self.vdb, "-o", "out.png", "--size", size, "--samples", "1", *options)
+
+    def scene(self, **keys):
+        return self.write("scene.json", json.dumps({"version": 1, **keys}))
+
+    def pixels(self, name="out.png"):
+        """Rows of (red, green, blue)."""
+        data = (self.folder / name).read_bytes()
+        self.assertTrue(data.startswith(b"\x89PNG"))
+        at, packed = 8, b""
+        while at < len(data):
+            (size,), kind = struct.unpack(">I", data[at : at + 4]), data[at + 4 : at + 8]
+            if kind == b"IHDR":
+                width, height, depth, colour = struct.unpack(">IIBB", data[at + 8 : at + 18])
+                self.assertEqual((depth, colour), (8, 2))
+            if kind == b"IDAT":
+                packed += data[at + 8 : at + 8 + size]
+            at += size + 12
+        raw, stride = zlib.decompress(packed), 3 * width
+        rows, before = [], bytearray(stride)
+        for y in range(height):
+            kind, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
+            for i in range(stride):
+                left, up, corner = row[i - 3] if i >= 3 else 0, before[i], before[i - 3] if i >= 3 else 0
+                guess = left + up - corner
+                nearest = min((abs(guess - v), n, v) for n, v in enumerate((left, up, corner)))[2]
+                row[i] = (row[i] + (0, left, up, (left + up) // 2, nearest)[kind]) % 256
+            rows.append([tuple(row[3 * x : 3 * x + 3]) for x in range(width)])
+            before = row
+        return rows
+
+    def test_without_a_scene_all_of_the_data_is_in_the_picture(self):
+        report = self.render()
+        self.assertEqual((report["command"], report["field"], report["size"]), ("render", "f", [400, 320]))
+        self.assertEqual(report["value_range"], [0, 1])
+        self.assertEqual(report["bricks"], {"total": 27, "drawn": report["bricks"]["drawn"]})
+        self.assertGreaterEqual(report["bricks"]["drawn"], 8)
+        rows = self.pixels()
+        self.assertEqual((len(rows), len(rows[0])), (320, 400))
+        border = rows[0] + rows[-1] + [row[0] for row in rows] + [row[-1] for row in rows]
+        self.assertEqual(set(border), {(255, 255, 255)})
+        self.assertNotEqual(rows[160][200], (255, 255, 255))
+
+    def test_a_scene_is_drawn_as_it_says(self):
+        # From before y = 0, as high as three cubes: red left of the middle, blue right of it.
+        stops = [{"value": v, "color": c, "opacity": 1} for v, c in ((0.5, [1, 0, 0]), (0.5, [0, 0, 1]))]
+        camera = {"eye": [0.5, -2, 0.5], "target": [0.5, 0, 0.5], "height": 3}
+        keys = {"camera": camera, "transfer_function": {"stops": stops}, "background": [0, 1, 0], "legend": False, "slices": 4}
+        self.render("--scene", self.scene(**keys), size="120x120")
+        rows = self.pixels()
+        green, red, blue = (0, 255, 0), (255, 0, 0), (0, 0, 255)
+        self.assertEqual([rows[60][x] for x in (35, 50, 58, 62, 70, 85)], [green, red, red, blue, blue, green])
+        self.assertEqual([rows[y][50] for y in (35, 45, 75, 85)], [green, red, red, green])
+        # Parts of it.
+        clip = {"box": [0, 0, 0, 0.25, 1, 1], "planes": [{"normal": [0, 0, -2], "offset": -1}]}
+        self.render("--scene", self.scene(**keys, clip=clip), size="120x120")
+        rows = self.pixels()
+        self.assertEqual([rows[70][x] for x in (45, 55, 70)], [red, green, green])
+        self.assertEqual(rows[50][45], green)
+
+    def test_options_count_instead_of_the_scene(self):
+        path = self.scene(field="none", size=[50, 40], samples=4, transfer_function={"map": "magma"})
+        self.reject(2, "none f", "render", self.vdb, "--scene", path, "-o", "out.png")
+        report = self.report("render", self.vdb, "--scene", path, "-o", "out.exr", "--field", "f")
+        self.assertEqual(report["size"], [50, 40])
+        header = (self.folder / "out.exr").read_bytes()[:1000]
+        for name in (b"R", b"G", b"B", b"A"):
+            self.assertIn(name + b"\0\2\0\0\0", header)  # of 32-bit floats
+
+    def test_a_picture_goes_to_standard_output(self):
+        command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
+        result = subprocess.run(command, capture_output=True, check=True, timeout=300)
+        self.assertTrue(result.stdout.startswith(b"\x89PNG"))
+
+    def test_a_small_picture_has_no_legend_and_says_so(self):
+        result = self.run_tessera("render", self.vdb, "-o", "out.png", "--size", "40x30")
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("no room for a legend", result.stderr)
+
+    def test_bad_input_is_one_line(self):
+        out = ("-o", "out.png")
+        self.reject(2, "missing.vdb", "render", "missing.vdb", *out)
+        self.reject(2, "cube.vtu", "render", self.cube, *out)
+        self.reject(2, "none f", "render", self.vdb, *out, "--field", "none")
+        self.reject(2, "component 3", "render", self.vdb, *out, "--component", "3")
+        self.reject(2, "png exr", "render", self.vdb, "-o", "out.jpg")
+        self.reject(2, "--size 0x4", "render", self.vdb, *out, "--size", "0x4")
+        self.reject(2, "--size 10", "render", self.vdb, *out, "--size", "10")
+        self.reject(2, "--size 10x10x10", "render", self.vdb, *out, "--size", "10x10x10")
+        self.reject(2, "--samples", "render", self.vdb, *out, "--samples", "3")
+        self.reject(2, "--output replace", "render", self.vdb, "-o", self.vdb)
+        self.reject(2, "nowhere.json", "render", self.vdb, *out, "--scene", "nowhere.json")
+        self.reject(2, "scene.json camera.eye", "render", self.vdb, *out, "--scene", self.scene(camera={"eye": 3}))
+        away = self.scene(camera={"eye": [5, 5, 5], "target": [9, 9, 9]})
+        self.reject(2, "scene.json nothing", "render", self.vdb, *out, "--scene", away)
+        log = self.scene(transfer_function={"log": True})
+        self.reject(2, "logarithmic", "render", self.vdb, *out, "--scene", log)
+
+    def test_the_schema_knows_the_scenes_that_are_read(self):
+        try:
+            import jsonschema
+        except ImportError:
+            self.skipTest("python3-jsonschema is not installed")
+        schema = json.loads((DATA.parent / "docs/scene.schema.json").read_text())
+        jsonschema.Draft7Validator.check_schema(schema)
+        validator = jsonschema.Draft7Validator(schema)
+        eye = {"eye": [3, 3, 3]}
+        cases = [
+            (True, {}),
+            (True, {"camera": {**eye, "target": [0, 0, 0], "up": [0, 1, 0], "opening": 50}, "size": [40, 30], "samples": 4, "slices": 1.5}),
+            (True, {"camera": {**eye, "height": 3}, "transfer_function": {"map": "turbo", "range": [0, 2], "opacity": [[0, 0.5]]}}),
+            (True, {"camera": {"direction": [1, 1, 1], "parallel": True}, "layer": 0.1, "background": [0, 0, 0], "legend": False, "unit": "m"}),
+            (True, {"transfer_function": {"stops": [{"value": 0, "opacity": 1}]}, "clip": {"box": [0, 0, 0, 1, 1, 0.5], "planes": []}}),
+            (True, {"clip": {"planes": [{"normal": [1, 0, 0], "offset": 0.2}]}, "field": "f"}),
+            (False, {"colour": 1}),
+            (False, {"version": 2}),
+            (False, {"camera": {"target": [0, 0, 0]}}),
+            (False, {"camera": {**eye, "direction": [1, 0, 0]}}),
+            (False, {"camera": {**eye, "opening": 30, "height": 3}}),
+            (False, {"camera": {"parallel": True, "opening": 30}}),
+            (False, {"transfer_function": {"stops": [{"value": 0, "opacity": 1}], "map": "gray"}}),
+            (False, {"transfer_function": {"stops": []}}),
+            (False, {"transfer_function": {"map": "jet"}}),
+            (False, {"transfer_function": {"opacity": [[0, 2]]}}),
+            (False, {"samples": 2}),
+            (False, {"size": [0, 10]}),
+            (False, {"clip": {"planes": [{"normal": [1, 0, 0]}]}}),
+        ]
+        for is_valid, keys in cases:
+            document = {"version": 1, **keys}
+            self.assertEqual(validator.is_valid(document), is_valid, document)
+            path = self.write("scene.json", json.dumps(document))
+            result = self.run_tessera("render", self.vdb, "-o", "out.png", "--size", "40x30", "--samples", "1", "--scene", path)
+            self.assertEqual(result.returncode, 0 if is_valid else 2, (document, result.stderr))
 
 
 class Slices(AppTest):

@@ -28,23 +28,43 @@ float interpolate(const float corners[8], vec3 t) {
     return mix(y.x, y.y, t.z);
 }
 
-// False where there is nothing of the mesh.
-bool sampleBrick(vec3 local, out float code) {
+ivec3 cornerOf(int c) {
+    return ivec3(c & 1, c >> 1 & 1, c >> 2);
+}
+
+// The first texel of the cell around a place counted in voxels, and where in the cell that is.
+ivec3 cellAt(vec3 local, out vec3 within) {
     vec3 cell = clamp(floor(local), vec3(0), vec3(CELLS - 1));
-    vec3 t = clamp(local - cell, 0.0, 1.0);
-    ivec3 texel = bricks[number].texel + ivec3(cell);
+    within = clamp(local - cell, 0.0, 1.0);
+    return bricks[number].texel + ivec3(cell);
+}
+
+int markAt(ivec3 texel) {
+    return int(texelFetch(coverage, texel, 0).r * 255.0 + 0.5);
+}
+
+// Above 0 in the mesh: coverage less a half.
+float coverAt(vec3 local) {
+    if (bricks[number].isWhole != 0) return 0.5;
+    vec3 within;
+    ivec3 texel = cellAt(local, within);
     float corners[8];
-    if (bricks[number].isWhole == 0) {
+    for (int c = 0; c < 8; ++c) corners[c] = markAt(texel + cornerOf(c)) > 0 ? 0.5 : -0.5;
+    return interpolate(corners, within);
+}
+
+// False where a sample around has no finite value.
+bool sampleBrick(vec3 local, out float code) {
+    vec3 within;
+    ivec3 texel = cellAt(local, within);
+    if (bricks[number].isWhole == 0)
         for (int c = 0; c < 8; ++c) {
-            int mark = int(texelFetch(coverage, texel + ivec3(c & 1, c >> 1 & 1, c >> 2), 0).r * 255.0 + 0.5);
-            corners[c] = mark > 0 ? 1.0 : 0.0;
+            int mark = markAt(texel + cornerOf(c));
             if (mark > 0 && (mark - 1 >> component & 1) != 0) return false;
         }
-        if (interpolate(corners, t) < 0.5) return false;
-    }
-    for (int c = 0; c < 8; ++c)
-        corners[c] = texelFetch(codes, texel + ivec3(c & 1, c >> 1 & 1, c >> 2), 0)[component];
-    code = interpolate(corners, t);
+    float corners[8];
+    for (int c = 0; c < 8; ++c) corners[c] = texelFetch(codes, texel + cornerOf(c), 0)[component];
+    code = interpolate(corners, within);
     return true;
 }
 
@@ -90,17 +110,23 @@ void main() {
     float slabsALength = dot(direction, forward) * slicesAVoxel / spacing;
     float slab = floor(begin * slabsALength - bricks[number].firstSlab);
     vec3 sum = vec3(0);
-    float light = 1.0;
+    float light = 1.0, cover = coverAt(from + begin * step);
     for (int left = 4 * int(float(CELLS) * max(slicesAVoxel, 1.0)); begin < end && left > 0; --left) {
         slab += 1.0;
         float next = min((bricks[number].firstSlab + slab) / slabsALength, end);
         if (left == 1) next = end;
         if (!(next > begin)) continue;
+        // The part in the mesh, coverage being taken as linear in between.
+        float coverNext = coverAt(from + next * step);
+        float crossing = mix(begin, next, clamp(cover / (cover - coverNext), 0.0, 1.0));
+        float first = cover < 0.0 ? crossing : begin, last = coverNext < 0.0 ? crossing : next;
+        bool isInside = max(cover, coverNext) >= 0.0 && last > first;
+        cover = coverNext;
         float code;
-        if (sampleBrick(from + 0.5 * (begin + next) * step, code)) {
+        if (isInside && sampleBrick(from + 0.5 * (first + last) * step, code)) {
             vec4 shown = shownAt(code);
             if (shown.a > 0.0) {
-                float passed = shown.a < 1.0 ? pow(1.0 - shown.a, (next - begin) * layersAWorldUnit) : 0.0;
+                float passed = shown.a < 1.0 ? pow(1.0 - shown.a, (last - first) * layersAWorldUnit) : 0.0;
                 sum += light * (1.0 - passed) * shown.rgb;
                 light *= passed;
                 if (light < kDark) break;

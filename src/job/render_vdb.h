@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "gl/gl_platform.h"
+#include "job/job.h"
+#include "job/run_report.h"
+#include "mesh/field_range.h"
+#include "render/slice_renderer.h"
+
+namespace tessera {
+
+/// What `tessera render` is asked for: a picture of a .vdb file's bricks. What is given here counts instead
+/// of what the scene says.
+struct RenderRequest {
+    std::string input, output;  ///< output: a .png or .exr file; "-": a .png to standard output
+    std::string scene;          ///< a file; empty: all defaults
+    std::optional<std::string> field;
+    std::optional<int> component;
+    std::optional<std::array<int, 2>> size;  ///< pixels, right and down
+    std::optional<int> samplesAPixel;
+    std::optional<GlPlatform> platform;  ///< none: the best there is
+};
+
+/// What was drawn.
+struct RenderedPicture {
+    std::string field, platform, device;
+    int width = 0, height = 0;
+    ValueRange range;  ///< of the field's values
+    std::size_t bricks = 0;
+    std::int64_t poolBytes = 0;
+    RenderCounts counts;
+};
+
+/// A .png is drawn over the scene's background, with its legend; an .exr has light in place of a screen's
+/// values, multiplied by the opacity A, without a background or legend. Throws InputError for a scene that
+/// doesn't fit the file, or that shows nothing, GlError, IoError.
+RenderedPicture renderVdb(const RenderRequest& request, Job& job);
+Json renderedJson(const RenderRequest& request, const RenderedPicture& picture);
+
+}  // namespace tessera

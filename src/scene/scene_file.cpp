@@ -1,0 +1,171 @@
+#include "scene/scene_file.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "scene/colour_maps.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kVersion = 1;
+constexpr int kMostPixels = 32768;
+constexpr std::size_t kMostPlanes = 16;
+
+std::array<double, 3> readColour(const JsonNode& json) {
+    const std::vector<double> parts = json.numbers(3);
+    std::array<double, 3> colour{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        if (!(parts[c] >= 0 && parts[c] <= 1)) json.fail("three numbers from 0 to 1");
+        colour[c] = parts[c];
+    }
+    return colour;
+}
+
+/// Refuses a key that another one rules out.
+void refuseBoth(const JsonNode& json, const char* key, const char* other) {
+    if (const auto found = json.find(key); found && json.find(other))
+        found->refuse(std::string("can't stand beside ") + other);
+}
+
+Vec3d readDirection(const JsonNode& json) {
+    const Vec3d direction = json.vector();
+    const double length = glm::length(direction);
+    if (!(length > 0) || !std::isfinite(length)) json.fail("a direction of a length above 0");
+    return direction / length;
+}
+
+SceneCamera readCamera(const JsonNode& json) {
+    json.expectKeys({"eye", "target", "direction", "up", "opening", "height", "parallel"});
+    SceneCamera camera;
+    for (const char* other : {"direction", "parallel"}) refuseBoth(json, other, "eye");
+    refuseBoth(json, "opening", "height");
+    refuseBoth(json, "opening", "parallel");
+    for (const char* needs : {"target", "height"})
+        if (const auto found = json.find(needs); found && !json.find("eye")) found->refuse("needs an eye");
+    if (const auto eye = json.find("eye")) camera.eyeWorld = eye->vector();
+    if (const auto target = json.find("target")) {
+        camera.targetWorld = target->vector();
+        if (*camera.targetWorld == *camera.eyeWorld) target->fail("another place than the eye");
+    }
+    if (const auto direction = json.find("direction")) camera.direction = readDirection(*direction);
+    if (const auto up = json.find("up")) camera.up = readDirection(*up);
+    if (const auto opening = json.find("opening")) camera.openingDegrees = opening->number(0.1, 170);
+    if (const auto height = json.find("height")) camera.heightWorld = height->length();
+    if (const auto parallel = json.find("parallel")) camera.isParallel = parallel->flag();
+    return camera;
+}
+
+SceneFunction readFunction(const JsonNode& json) {
+    json.expectKeys({"map", "range", "log", "opacity", "stops"});
+    SceneFunction function;
+    for (const char* other : {"map", "range", "log", "opacity"}) refuseBoth(json, other, "stops");
+    if (const auto stops = json.find("stops")) function.stops = readStops(*stops);
+    if (const auto map = json.find("map")) {
+        function.map = map->text();
+        std::string names;
+        for (const std::string_view name : colourMapNames())
+            names += (names.empty() ? "" : ", ") + std::string(name);
+        if (!isColourMap(function.map)) map->fail("one of " + names);
+    }
+    if (const auto range = json.find("range")) {
+        const std::vector<double> ends = range->numbers(2);
+        if (!(ends[0] < ends[1])) range->fail("two numbers, the smaller one first");
+        function.range = {ends[0], ends[1]};
+    }
+    if (const auto log = json.find("log")) function.isLogarithmic = log->flag();
+    if (const auto opacity = json.find("opacity")) {
+        const std::string expected = "a list of [share of the range, opacity], each from 0 to 1, ascending";
+        for (const JsonNode& pair : opacity->list(expected)) {
+            const std::vector<double> at = pair.numbers(2);
+            if (!(at[0] >= 0 && at[0] <= 1 && at[1] >= 0 && at[1] <= 1) ||
+                (!function.opacities.empty() && at[0] < function.opacities.back()[0]))
+                opacity->fail(expected);
+            function.opacities.push_back({at[0], at[1]});
+        }
+        if (function.opacities.empty()) opacity->fail(expected);
+    }
+    return function;
+}
+
+void readClip(const JsonNode& json, std::vector<HalfSpace>& within) {
+    json.expectKeys({"box", "planes"});
+    if (const auto box = json.find("box")) {
+        const std::vector<double> b = box->numbers(6);
+        for (int a = 0; a < 3; ++a) {
+            const double low = b[std::size_t(a)], high = b[std::size_t(a) + 3];
+            if (!(low < high)) box->fail("x0, y0, z0, x1, y1, z1, each first one below the second");
+            Vec3d axis(0);
+            axis[a] = 1;
+            within.push_back({axis, low});
+            within.push_back({-axis, -high});
+        }
+    }
+    if (const auto planes = json.find("planes")) {
+        const auto list = planes->list("a list of planes");
+        if (list.size() > kMostPlanes) planes->fail("at most 16 planes");
+        for (const JsonNode& plane : list) {
+            plane.expectKeys({"normal", "offset"});
+            const Vec3d normal = plane.at("normal").vector();
+            const Vec3d direction = readDirection(plane.at("normal"));
+            within.push_back({direction, plane.at("offset").number() / glm::length(normal)});
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<TransferFunction::Stop> readStops(const JsonNode& json) {
+    TransferFunction function;
+    for (const JsonNode& node : json.list("a list of stops")) {
+        node.expectKeys({"value", "color", "opacity"});
+        TransferFunction::Stop stop;
+        stop.value = node.at("value").number();
+        stop.opacity = node.at("opacity").number();
+        if (const auto color = node.find("color")) {
+            const std::vector<double> parts = color->numbers(3);
+            std::copy(parts.begin(), parts.end(), stop.color.begin());
+        }
+        function.stops.push_back(stop);
+    }
+    try {
+        checkTransferFunction(function);
+    } catch (const InputError& error) {
+        json.refuse(error.what());
+    }
+    return function.stops;
+}
+
+Scene readScene(const std::string& path) {
+    const JsonNode json = JsonNode::read(path, "the scene");
+    json.expectKeys({"$schema", "version", "field", "component", "camera", "transfer_function", "layer",
+                     "background", "clip", "size", "samples", "slices", "legend", "unit"});
+    if (json.at("version").number() != kVersion) json.at("version").fail("1, the version of this format");
+    Scene scene;
+    if (const auto field = json.find("field")) scene.field = field->text();
+    if (const auto component = json.find("component")) scene.component = component->whole(0, 8);
+    if (const auto camera = json.find("camera")) scene.camera = readCamera(*camera);
+    if (const auto function = json.find("transfer_function")) scene.function = readFunction(*function);
+    if (const auto layer = json.find("layer")) scene.layerWorld = layer->length();
+    if (const auto background = json.find("background")) scene.ground = readColour(*background);
+    if (const auto clip = json.find("clip")) readClip(*clip, scene.within);
+    if (const auto size = json.find("size")) {
+        const auto edges = size->list("width and height in pixels");
+        if (edges.size() != 2) size->fail("width and height in pixels");
+        scene.width = edges[0].whole(1, kMostPixels);
+        scene.height = edges[1].whole(1, kMostPixels);
+    }
+    if (const auto samples = json.find("samples")) {
+        scene.samplesAPixel = samples->whole(1, 16);
+        const int side = int(std::lround(std::sqrt(scene.samplesAPixel)));
+        if (side * side != scene.samplesAPixel) samples->fail("1, 4, 9 or 16");
+    }
+    if (const auto slices = json.find("slices")) scene.slicesAVoxel = slices->number(0.125, 64);
+    if (const auto legend = json.find("legend")) scene.hasLegend = legend->flag();
+    if (const auto unit = json.find("unit")) scene.unit = unit->text();
+    return scene;
+}
+
+}  // namespace tessera
