@@ -390,6 +390,12 @@ void addRenderOptions(CLI::App& command, RenderArguments& a) {
     command.add_option("--size", a.size, "pixels, such as 1920x1080 (default: the scene's, or 1024x768)");
     command.add_option("--samples", a.request.samplesAPixel, "rays a pixel (default: the scene's, or 4)")
         ->check(CLI::IsMember({1, 4, 9, 16}));
+    command
+        .add_option("--without", a.request.without,
+                    "leave out this effect of the scene: bricks, isosurfaces or shading; may be repeated")
+        ->allow_extra_args(false);
+    command.add_flag("--explain", a.request.explains,
+                     "tell what each effect costs, and how much of the picture it changes");
     command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
         ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
     addCommonOptions(command, a.common);

@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "files/atomic_file.h"
 #include "job/output_paths.h"
+#include "job/table_text.h"
 #include "job/vdb_contents.h"
 #include "pictures/image.h"
 #include "pictures/image_exr.h"
@@ -33,6 +34,11 @@ Scene sceneOf(const RenderRequest& request) {
     if (request.component) scene.component = request.component;
     if (request.size) scene.width = (*request.size)[0], scene.height = (*request.size)[1];
     if (request.samplesAPixel) scene.samplesAPixel = *request.samplesAPixel;
+    for (const std::string& name : request.without) {
+        const auto isNamed = [&](const Effect& effect) { return effect.name == name; };
+        if (std::erase_if(scene.effects, isNamed) == 0)
+            throw InputError(fmt::format("--without: the scene has no effect '{}'", name));
+    }
     return scene;
 }
 
@@ -158,6 +164,55 @@ void addLegend(const Scene& scene, const TransferFunction& function, const std::
                              picture.height));
 }
 
+/// Draws the picture again without each of its effects. The first drawing of all, which has made shaders, is
+/// done again too; of two the faster one counts.
+template <class Draw>
+std::vector<EffectCost> explainEffects(const RenderOptions& options, const RgbaImage& image,
+                                       RenderCounts& whole, const Draw& draw) {
+    const auto fastest = [&](const RenderOptions& of, RgbaImage& drawn) {
+        RenderCounts counts, again;
+        drawn = draw(of, counts);
+        draw(of, again);
+        counts.drawMs = std::min(counts.drawMs, again.drawMs);
+        return counts;
+    };
+    RgbaImage drawn;
+    whole = fastest(options, drawn);
+    std::vector<EffectCost> costs;
+    for (std::size_t i = 0; i < options.effects.size(); ++i) {
+        RenderOptions without = options;
+        without.effects.erase(without.effects.begin() + std::ptrdiff_t(i));
+        const RenderCounts counts = fastest(without, drawn);
+        EffectCost& cost = costs.emplace_back();
+        cost.name = options.effects[i].name;
+        cost.drawMs = whole.drawMs - counts.drawMs;
+        cost.bricks = whole.bricks - counts.bricks;
+        double squares = 0;
+        for (std::size_t p = 0; p < image.pixels.size(); ++p)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double apart = double(image.pixels[p][c]) - double(drawn.pixels[p][c]);
+                squares += apart * apart;
+                cost.changesPixels += c == 0 && image.pixels[p] != drawn.pixels[p];
+            }
+        cost.changeRms = 255 * std::sqrt(squares / double(3 * image.pixels.size()));
+    }
+    return costs;
+}
+
+std::string explanation(const RenderedPicture& picture, std::size_t width) {
+    TableRows rows{{"", "bricks", "ms", "changed pixels", "RMS of 255"}};
+    rows.push_back({"the picture", std::to_string(picture.counts.bricks),
+                    fmt::format("{:.1f}", picture.counts.drawMs), "", ""});
+    for (const EffectCost& effect : picture.effects)
+        rows.push_back({"of it " + effect.name, fmt::format("{:+}", effect.bricks),
+                        fmt::format("{:+.1f}", effect.drawMs), std::to_string(effect.changesPixels),
+                        fmt::format("{:.2f}", effect.changeRms)});
+    return formatTable(rows, width) +
+           fmt::format("device memory: bricks {:.1f} MB, picture {:.1f} MB; {} draw calls\n",
+                       double(picture.poolBytes) * 1e-6, double(picture.counts.deviceBytes) * 1e-6,
+                       picture.counts.draws);
+}
+
 }  // namespace
 
 RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
@@ -200,6 +255,7 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
     options.slicesAVoxel = scene.slicesAVoxel;
     options.within = scene.within;
     options.samplesAPixel = scene.samplesAPixel;
+    options.effects = scene.effects;
 
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
     BrickPool pool = makePool(thread, file.tree, picture.range);
@@ -212,8 +268,12 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
     const BrickFrame frame{file.tree.originWorld(), file.tree.spacingWorld(levelOf(Depth(0), deepest)),
                            file.tree.brickCells()};
     const auto state = pool.state();
-    const RgbaImage image = SliceRenderer(thread).draw(
-        pool, frame, placeBricks(target, leaves, 0, job.execution), options, job.execution, &picture.counts);
+    SliceRenderer renderer(thread);
+    const std::vector<PlacedBrick> placed = placeBricks(target, leaves, 0, job.execution);
+    const auto draw = [&](const RenderOptions& of, RenderCounts& counts) {
+        return renderer.draw(pool, *state, frame, placed, of, job.execution, &counts);
+    };
+    const RgbaImage image = draw(options, picture.counts);
     if (std::none_of(image.pixels.begin(), image.pixels.end(), [](const Rgba& p) { return p[3] > 0; }))
         throw InputError(
             fmt::format("{}: nothing of {} is in the picture: the camera, a clip or the transfer "
@@ -226,6 +286,7 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
         if (scene.hasLegend) addLegend(scene, options.function, channel.title(), shownRange, shown, job);
         writePng(request.output, shown);
     }
+    if (request.explains) picture.effects = explainEffects(options, image, picture.counts, draw);
     picture.field = channel.title();
     picture.platform = nameOf(thread.platform());
     picture.device = thread.info().renderer;
@@ -237,6 +298,7 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
         fmt::format("{}: {}, {} x {} pixels, values {:.6g} to {:.6g}; {} of {} bricks drawn in {:.0f} ms\n",
                     request.output, picture.field, picture.width, picture.height, picture.range.min,
                     picture.range.max, picture.counts.bricks, picture.bricks, picture.counts.drawMs));
+    if (request.explains) job.say(explanation(picture, job.textWidth));
     return picture;
 }
 
@@ -253,6 +315,15 @@ Json renderedJson(const RenderRequest& request, const RenderedPicture& picture) 
     json["draw_calls"] = picture.counts.draws;
     json["device_bytes"] = {{"bricks", picture.poolBytes}, {"picture", picture.counts.deviceBytes}};
     json["draw_ms"] = picture.counts.drawMs;
+    if (request.explains) {
+        json["effects"] = Json::array();
+        for (const EffectCost& effect : picture.effects)
+            json["effects"].push_back({{"name", effect.name},
+                                       {"draw_ms", effect.drawMs},
+                                       {"bricks", effect.bricks},
+                                       {"changed_pixels", effect.changesPixels},
+                                       {"change_rms_255", effect.changeRms}});
+    }
     return json;
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "gl/gl_platform.h"
 #include "job/job.h"
@@ -22,6 +23,17 @@ struct RenderRequest {
     std::optional<std::array<int, 2>> size;  ///< pixels, right and down
     std::optional<int> samplesAPixel;
     std::optional<GlPlatform> platform;  ///< none: the best there is
+    std::vector<std::string> without;    ///< effects of the scene to leave out
+    bool explains = false;               ///< tells what each effect costs, and what it changes
+};
+
+/// What a picture has by an effect, against the same without it.
+struct EffectCost {
+    std::string name;
+    double drawMs = 0;
+    std::int64_t bricks = 0;  ///< drawn for it alone
+    std::int64_t changesPixels = 0;
+    double changeRms = 0;  ///< of red, green and blue, of 255
 };
 
 /// What was drawn.
@@ -32,6 +44,7 @@ struct RenderedPicture {
     std::size_t bricks = 0;
     std::int64_t poolBytes = 0;
     RenderCounts counts;
+    std::vector<EffectCost> effects;  ///< when asked for
 };
 
 /// A .png is drawn over the scene's background, with its legend; an .exr has light in place of a screen's

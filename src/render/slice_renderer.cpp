@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -29,6 +30,8 @@ struct DeviceBrick {
     float spacing;
     std::array<std::int32_t, 3> texel;
     std::int32_t isWhole;
+    std::array<std::int32_t, 3> index;
+    std::int32_t depth;
     float firstSlab;
     std::array<float, 3> padding;
 };
@@ -51,12 +54,23 @@ std::array<float, 3> floats(const Vec3d& v) {
 /// What the picture's camera looks like from the bricks.
 class Scene {
   public:
-    Scene(const BrickPool& pool, const BrickFrame& frame, const RenderOptions& options)
+    Scene(const BrickPool& pool, const BrickFrame& frame, std::span<const PlacedBrick> bricks,
+          const RenderOptions& options)
         : pool_(pool), frame_(frame), options_(options), view_(viewOf(options.camera)) {
         const Vec3d& eye = options.camera.eyeWorld;
         for (const HalfSpace& half : options.within)
             clips_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye)});
         seen_ = clips_;
+        needsAll_ = std::any_of(options.effects.begin(), options.effects.end(),
+                                [](const Effect& effect) { return effect.needsAllBricks; });
+        for (const PlacedBrick& brick : bricks) {
+            const Box3d box = frame.boxWorld(brick.key);
+            box_.include(box.min);
+            box_.include(box.max);
+            if (brick.range.empty()) continue;
+            range_.min = std::min(range_.min, brick.range.min);
+            range_.max = std::max(range_.max, brick.range.max);
+        }
         const double wide = view_.wide, high = view_.high;
         seen_.push_back({view_.forward, 0});
         for (const double sign : {-1.0, 1.0}) {
@@ -78,7 +92,8 @@ class Scene {
         if (!brick.isCovered || brick.range.empty()) return false;
         // Rounded codes may lie a step beyond the range.
         const double beyond = brick.range.width() / 64 + 1e-6 * std::abs(brick.range.max);
-        if (!showsAny(options_.function, brick.range.min - beyond, brick.range.max + beyond)) return false;
+        if (!needsAll_ && !showsAny(options_.function, brick.range.min - beyond, brick.range.max + beyond))
+            return false;
         const Box3d box = fromEye(brick);
         return std::none_of(seen_.begin(), seen_.end(), [&](const HalfSpace& half) {
             const Vec3d& n = half.normalWorld;
@@ -110,12 +125,15 @@ class Scene {
         for (int a = 0; a < 3; ++a)
             nearest += std::min(view_.forward[a] * box.min[a], view_.forward[a] * box.max[a]);
         const double slab = spacing / options_.slicesAVoxel;
-        return {floats(box.min),
-                float(spacing),
-                {texel.x, texel.y, texel.z},
-                brick.isWhole,
-                float(std::floor(std::max(nearest, 0.0) / slab)),
-                {}};
+        DeviceBrick placed{};
+        placed.low = floats(box.min);
+        placed.spacing = float(spacing);
+        placed.texel = {texel.x, texel.y, texel.z};
+        placed.isWhole = brick.isWhole;
+        placed.index = {brick.key.index.x, brick.key.index.y, brick.key.index.z};
+        placed.depth = brick.key.depth.halvings();
+        placed.firstSlab = float(std::floor(std::max(nearest, 0.0) / slab));
+        return placed;
     }
 
     std::vector<DeviceStop> stops() const {
@@ -129,6 +147,18 @@ class Scene {
         return stops;
     }
 
+    EffectScene forEffects(const GlFunctions& gl, const GlProgram& program) const {
+        const Camera& camera = options_.camera;
+        const double rays = camera.heightPixels * std::sqrt(options_.samplesAPixel);
+        const Vec3d size = box_.size();
+        return {gl,
+                program,
+                pool_.coding().codings()[std::size_t(options_.channel)],
+                range_,
+                std::max({size.x, size.y, size.z}),
+                2 * view_.high / rays};
+    }
+
   private:
     Box3d fromEye(const PlacedBrick& brick) const {
         const Box3d box = frame_.boxWorld(brick.key);
@@ -140,6 +170,9 @@ class Scene {
     const RenderOptions& options_;
     CameraView view_;
     std::vector<HalfSpace> clips_, seen_;
+    bool needsAll_ = false;
+    Box3d box_;         // of all bricks
+    ValueRange range_;  // likewise
 };
 
 /// A part of the picture, in rays from its top left.
@@ -166,29 +199,89 @@ void checkOptions(const BrickPool& pool, const RenderOptions& options) {
 
 }  // namespace
 
+void EffectScene::set(const char* name, double value) const {
+    gl.ProgramUniform1f(program.id(), program.uniform(name), float(value));
+}
+
+void EffectScene::set(const char* name, const Vec3d& value) const {
+    gl.ProgramUniform3f(program.id(), program.uniform(name), float(value.x), float(value.y), float(value.z));
+}
+
 // All that OpenGL has; only its thread looks at it.
 struct SliceRenderer::Device {
-    std::optional<GlProgram> bricks, close;
-    int cells = 0;  // that `bricks` was made for
+    std::map<std::string, GlProgram> programs;  // by cells and effects
+    const GlProgram* bricks = nullptr;          // of the picture
+    std::optional<GlProgram> close;
     GlVertexArray vertices;
     GlTexture color, depth;
     GlFramebuffer target, closing;
 
-    void prepare(GlContext& context, int brickCells);
-    void setUniforms(const GlFunctions& gl, const Scene& scene, const RenderOptions& options) const;
+    void prepare(GlContext& context, int brickCells, std::span<const Effect> effects);
+    const GlProgram& programOf(GlContext& context, int brickCells, std::span<const Effect> effects);
+    void setUniforms(const GlFunctions& gl, const Scene& scene, const BrickPool& pool,
+                     const RenderOptions& options) const;
     void draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs, std::size_t brickCount,
               const PictureTile& tile, const Vec3i& picture, std::size_t group, RenderCounts& counts) const;
 };
 
-void SliceRenderer::Device::prepare(GlContext& context, int brickCells) {
+/// Text of a function that calls those of all effects; none, and no define, where no effect has one.
+struct Hook {
+    const char* define;
+    const char* begin;  // of the function
+    const char* call;   // of one of them, behind its name
+    const char* end;
+    std::string Effect::*function;
+    bool addsUp;
+};
+
+constexpr Hook kHooks[] = {
+    {"SHADE", "void shadeByEffects(inout vec4 shown, vec3 local, vec3 direction) {\n",
+     "(shown, local, direction);\n", "}\n", &Effect::shade, false},
+    {"SHEET",
+     "vec4 sheetByEffects(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction) {\n"
+     "    vec4 sum = vec4(0);\n",
+     "(codeBegin, codeEnd, begin, end, direction);\n", "    return sum;\n}\n", &Effect::sheet, true},
+    {"FACE", "vec4 faceByEffects(vec3 local) {\n    vec4 sum = vec4(0);\n", "(local);\n",
+     "    return sum;\n}\n", &Effect::face, true},
+};
+
+const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickCells,
+                                                  std::span<const Effect> effects) {
+    std::string key = std::to_string(brickCells);
+    for (const Effect& effect : effects) key += " " + effect.name;
+    if (const auto found = programs.find(key); found != programs.end()) return found->second;
     namespace text = shaders::render;
-    if (!bricks || cells != brickCells) {
-        bricks = makeProgram(context,
-                             {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kBrick}},
-                              {GL_FRAGMENT_SHADER, text::kBrickFragment, {text::kBrick}}},
-                             {{"CELLS", std::to_string(brickCells)}});
-        cells = brickCells;
+    std::vector<ShaderDefine> defines{{"CELLS", std::to_string(brickCells)}};
+    std::vector<ShaderText> shared{text::kBrick};
+    if (std::ranges::any_of(effects, &Effect::readsIndex)) {
+        defines.push_back({"BRICK_INDEX_BINDING", "2"});
+        shared.push_back(brickIndexShader());
     }
+    shared.push_back(text::kBrickSample);
+    for (const Effect& effect : effects)
+        for (const ShaderText& one : effect.texts)
+            if (std::ranges::find(shared, one.name, &ShaderText::name) == shared.end()) shared.push_back(one);
+    std::string calls;
+    for (const Hook& hook : kHooks) {
+        std::string body;
+        for (const Effect& effect : effects)
+            if (const std::string& function = effect.*hook.function; !function.empty())
+                body += (hook.addsUp ? "    sum += (1.0 - sum.a) * " : "    ") + function + hook.call;
+        if (body.empty()) continue;
+        defines.push_back({hook.define});
+        calls += hook.begin + body + hook.end;
+    }
+    if (!calls.empty()) shared.push_back({"calls of effects", calls});
+    GlProgram made = makeProgram(context,
+                                 {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kBrick}},
+                                  {GL_FRAGMENT_SHADER, text::kBrickFragment, shared}},
+                                 defines);
+    return programs.emplace(key, std::move(made)).first->second;
+}
+
+void SliceRenderer::Device::prepare(GlContext& context, int brickCells, std::span<const Effect> effects) {
+    namespace text = shaders::render;
+    bricks = &programOf(context, brickCells, effects);
     if (!close)
         close = makeProgram(
             context, {{GL_VERTEX_SHADER, text::kCloseVertex}, {GL_FRAGMENT_SHADER, text::kCloseFragment}});
@@ -212,7 +305,7 @@ void SliceRenderer::Device::prepare(GlContext& context, int brickCells) {
     target = std::move(made.target), closing = std::move(made.closing);
 }
 
-void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scene,
+void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scene, const BrickPool& pool,
                                         const RenderOptions& options) const {
     const GLuint program = bricks->id();
     const auto vector = [&](const char* name, const Vec3d& v) {
@@ -239,6 +332,10 @@ void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scen
         gl.ProgramUniform4fv(program, bricks->uniform("clips"), int(clips.size()), clips[0].data());
     number("slicesAVoxel", options.slicesAVoxel);
     number("layersAWorldUnit", 1 / options.layerWorld);
+    const Vec3i& slots = pool.layout().slots;
+    gl.ProgramUniform3i(program, bricks->uniform("slotsAlong"), slots.x, slots.y, slots.z);
+    const EffectScene known = scene.forEffects(gl, *bricks);
+    for (const Effect& effect : options.effects) effect.setUniforms(known);
 }
 
 void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs,
@@ -289,6 +386,7 @@ void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std:
             const std::size_t count = std::min(run.count - done, part - open);
             gl.BindTextureUnit(0, pool.codes(run.atlas, group).id());
             gl.BindTextureUnit(1, pool.coverage(run.atlas, group).id());
+            gl.ProgramUniform1i(program, bricks->uniform("atlas"), run.atlas);
             gl.ProgramUniform1i(program, bricks->uniform("firstBrick"), int(run.first + done));
             gl.DrawArraysInstanced(GL_TRIANGLES, 0, 36, GLsizei(count));
             ++counts.draws;
@@ -312,11 +410,11 @@ SliceRenderer::SliceRenderer(GlThread& thread)
 
 SliceRenderer::~SliceRenderer() = default;
 
-RgbaImage SliceRenderer::draw(const BrickPool& pool, const BrickFrame& frame,
+RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, const BrickFrame& frame,
                               std::span<const PlacedBrick> bricks, const RenderOptions& options,
                               const Execution& execution, RenderCounts* counts) {
     checkOptions(pool, options);
-    const Scene scene(pool, frame, options);
+    const Scene scene(pool, frame, bricks, options);
     const std::vector<const PlacedBrick*> seen = scene.inOrder(bricks);
     std::vector<DeviceBrick> placed;
     std::vector<Run> runs;
@@ -338,7 +436,6 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const BrickFrame& frame,
         return image;
     }
 
-    GlBuffer brickBuffer, stopBuffer;
     const int pixelsATile = kTile / side;
     const Vec3i picture(image.width * side, image.height * side, 1);
     const std::size_t group = std::size_t(options.channel) / kChannelsAGroup;
@@ -350,7 +447,7 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const BrickFrame& frame,
     const std::shared_ptr<Uploaded> uploaded(
         new Uploaded, [this](Uploaded* buffers) { thread_.run([buffers](GlContext&) { delete buffers; }); });
     thread_.run([&](GlContext& context) {
-        device_->prepare(context, pool.brickCells());
+        device_->prepare(context, pool.brickCells(), options.effects);
         uploaded->bricks = GlBuffer(context, std::span(placed));
         uploaded->stops = GlBuffer(context, std::span(stops));
         count.deviceBytes = uploaded->bricks.bytes() + uploaded->stops.bytes() +
@@ -366,7 +463,8 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const BrickFrame& frame,
             thread_.run([&](GlContext& context) {
                 const GlFunctions& gl = context.functions();
                 const Timer timer;
-                device_->setUniforms(gl, scene, options);
+                device_->setUniforms(gl, scene, pool, options);
+                if (state.index) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, state.index->id());
                 gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, uploaded->bricks.id());
                 gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, uploaded->stops.id());
                 device_->draw(context, pool, runs, placed.size(), tile, picture, group, count);

@@ -7,6 +7,7 @@
 
 #include "base/rgba_image.h"
 #include "pool/brick_pool.h"
+#include "render/effect.h"
 #include "render/placed_bricks.h"
 #include "tessera/execution.h"
 #include "tessera/focus.h"
@@ -27,6 +28,8 @@ struct RenderOptions {
     std::vector<HalfSpace> within;
     /// Rays a pixel, in a square: 1, 4, 9 or 16.
     int samplesAPixel = 1;
+    /// In the order in which they shade.
+    std::vector<Effect> effects;
 };
 
 struct RenderCounts {
@@ -63,10 +66,11 @@ class SliceRenderer {
     SliceRenderer& operator=(const SliceRenderer&) = delete;
 
     /// Red, green and blue are those of the transfer function times the opacity. The pool is one of this
-    /// thread; a state of it that shows the bricks is to be held. Throws InputError for options out of range,
+    /// thread, in a state that shows the bricks. Throws InputError for options out of range,
     /// GlError when the device fails or has no room, Cancelled.
-    RgbaImage draw(const BrickPool& pool, const BrickFrame& frame, std::span<const PlacedBrick> bricks,
-                   const RenderOptions& options, const Execution& execution, RenderCounts* counts = nullptr);
+    RgbaImage draw(const BrickPool& pool, const PoolState& state, const BrickFrame& frame,
+                   std::span<const PlacedBrick> bricks, const RenderOptions& options,
+                   const Execution& execution, RenderCounts* counts = nullptr);
 
   private:
     struct Device;

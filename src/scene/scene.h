@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mesh/field_range.h"
+#include "render/effect.h"
 #include "tessera/focus.h"
 #include "tessera/transfer_function.h"
 #include "tessera/vec.h"
@@ -48,7 +49,8 @@ struct Scene {
     int samplesAPixel = 4;
     double slicesAVoxel = 2;
     bool hasLegend = true;
-    std::string unit;  ///< of the values, for the legend
+    std::string unit;             ///< of the values, for the legend
+    std::vector<Effect> effects;  ///< in the order in which they are applied
 };
 
 /// The camera of a scene. @param boundsWorld of what is to be in the picture. @param legendPixels that its

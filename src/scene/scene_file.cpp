@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/effects.h"
 #include "scene/colour_maps.h"
 #include "tessera/error.h"
 
@@ -115,6 +116,56 @@ void readClip(const JsonNode& json, std::vector<HalfSpace>& within) {
     }
 }
 
+double readShare(const JsonNode& json, const char* key, double otherwise) {
+    const auto found = json.find(key);
+    return found ? found->number(0, 1) : otherwise;
+}
+
+Effect readShading(const JsonNode& json) {
+    json.expectKeys({"light", "ambient", "diffuse", "specular", "shininess"});
+    Shading shading;
+    if (const auto light = json.find("light")) shading.towardsLight = readDirection(*light);
+    shading.ambient = readShare(json, "ambient", shading.ambient);
+    shading.diffuse = readShare(json, "diffuse", shading.diffuse);
+    shading.specular = readShare(json, "specular", shading.specular);
+    if (const auto shininess = json.find("shininess")) shading.shininess = shininess->number(1, 1000);
+    return shadingEffect(shading);
+}
+
+Effect readIsosurfaces(const JsonNode& json) {
+    json.expectKeys({"surfaces", "light"});
+    std::vector<Isosurface> surfaces;
+    const std::string expected = "a list of 1 to 16 surfaces";
+    for (const JsonNode& node : json.at("surfaces").list(expected)) {
+        node.expectKeys({"value", "color", "opacity"});
+        Isosurface surface;
+        surface.value = node.at("value").number();
+        if (const auto color = node.find("color")) surface.color = readColour(*color);
+        surface.opacity = readShare(node, "opacity", surface.opacity);
+        surfaces.push_back(surface);
+    }
+    if (surfaces.empty() || surfaces.size() > 16) json.at("surfaces").fail(expected);
+    const auto light = json.find("light");
+    return isosurfacesEffect(std::move(surfaces), light ? readDirection(*light) : Vec3d(0));
+}
+
+Effect readBrickEdges(const JsonNode& json) {
+    json.expectKeys({"width", "opacity"});
+    BrickEdges edges;
+    if (const auto width = json.find("width")) edges.widthPixels = width->number(0.1, 100);
+    edges.opacity = readShare(json, "opacity", edges.opacity);
+    return brickEdgesEffect(edges);
+}
+
+std::vector<Effect> readEffects(const JsonNode& json) {
+    json.expectKeys({"bricks", "isosurfaces", "shading"});
+    std::vector<Effect> effects;
+    if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
+    if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
+    if (const auto shading = json.find("shading")) effects.push_back(readShading(*shading));
+    return effects;
+}
+
 }  // namespace
 
 std::vector<TransferFunction::Stop> readStops(const JsonNode& json) {
@@ -141,7 +192,7 @@ std::vector<TransferFunction::Stop> readStops(const JsonNode& json) {
 Scene readScene(const std::string& path) {
     const JsonNode json = JsonNode::read(path, "the scene");
     json.expectKeys({"$schema", "version", "field", "component", "camera", "transfer_function", "layer",
-                     "background", "clip", "size", "samples", "slices", "legend", "unit"});
+                     "background", "clip", "size", "samples", "slices", "legend", "unit", "effects"});
     if (json.at("version").number() != kVersion) json.at("version").fail("1, the version of this format");
     Scene scene;
     if (const auto field = json.find("field")) scene.field = field->text();
@@ -164,6 +215,7 @@ Scene readScene(const std::string& path) {
     }
     if (const auto slices = json.find("slices")) scene.slicesAVoxel = slices->number(0.125, 64);
     if (const auto legend = json.find("legend")) scene.hasLegend = legend->flag();
+    if (const auto effects = json.find("effects")) scene.effects = readEffects(*effects);
     if (const auto unit = json.find("unit")) scene.unit = unit->text();
     return scene;
 }

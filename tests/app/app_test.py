@@ -1161,6 +1161,27 @@ class Pictures(AppTest):
         for name in (b"R", b"G", b"B", b"A"):
             self.assertIn(name + b"\0\2\0\0\0", header)  # of 32-bit floats
 
+    def test_an_effect_tells_what_it_costs_and_can_be_left_out(self):
+        surfaces = {"surfaces": [{"value": 0.5, "color": [1, 0, 0]}]}
+        path = self.scene(effects={"shading": {}, "isosurfaces": surfaces}, legend=False)
+        report = self.render("--scene", path, "--explain", size="60x48")
+        self.assertEqual([effect["name"] for effect in report["effects"]], ["isosurfaces", "shading"])
+        for effect in report["effects"]:
+            self.assertEqual(set(effect), {"name", "draw_ms", "bricks", "changed_pixels", "change_rms_255"})
+            self.assertGreater(effect["changed_pixels"], 50)
+            self.assertGreater(effect["change_rms_255"], 0.5)
+        every = self.pixels()
+        self.assertNotIn("effects", self.render("--scene", path, "--without", "shading", size="60x48"))
+        self.assertNotEqual(self.pixels(), every)
+        text = self.succeed("render", self.vdb, "--scene", path, "-o", "out.png", "--size", "60x48", "--explain")
+        for words in ("the picture", "of it isosurfaces", "of it shading", "device memory"):
+            self.assertIn(words, text)
+        self.render("--scene", self.scene(legend=False), size="60x48")
+        volume = self.pixels()
+        self.render("--scene", self.scene(effects={"shading": {}, "bricks": {}}, legend=False), "--without", "shading", "--without", "bricks", size="60x48")
+        self.assertEqual(self.pixels(), volume)
+        self.reject(2, "--without bricks", "render", self.vdb, "--scene", self.scene(), "-o", "x.png", "--without", "bricks")
+
     def test_a_picture_goes_to_standard_output(self):
         command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
         result = subprocess.run(command, capture_output=True, check=True, timeout=300)
@@ -1206,6 +1227,12 @@ class Pictures(AppTest):
             (True, {"camera": {"direction": [1, 1, 1], "parallel": True}, "layer": 0.1, "background": [0, 0, 0], "legend": False, "unit": "m"}),
             (True, {"transfer_function": {"stops": [{"value": 0, "opacity": 1}]}, "clip": {"box": [0, 0, 0, 1, 1, 0.5], "planes": []}}),
             (True, {"clip": {"planes": [{"normal": [1, 0, 0], "offset": 0.2}]}, "field": "f"}),
+            (True, {"effects": {"shading": {"light": [1, 1, 1], "shininess": 10}, "bricks": {"width": 2}}}),
+            (True, {"effects": {"isosurfaces": {"surfaces": [{"value": 0.5, "color": [1, 0, 0], "opacity": 0.5}]}}}),
+            (False, {"effects": {"glow": {}}}),
+            (False, {"effects": {"isosurfaces": {}}}),
+            (False, {"effects": {"isosurfaces": {"surfaces": []}}}),
+            (False, {"effects": {"shading": {"ambient": 2}}}),
             (False, {"colour": 1}),
             (False, {"version": 2}),
             (False, {"camera": {"target": [0, 0, 0]}}),

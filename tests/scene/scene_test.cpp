@@ -51,6 +51,8 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
                               "opacity": [[0, 0], [0.5, 0.25], [0.5, 1]]},
         "layer": 0.5, "background": [0, 0.5, 1],
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
+        "effects": {"shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {},
+                    "isosurfaces": {"surfaces": [{"value": 3}, {"value": 1, "color": [1, 0, 0], "opacity": 0.5}]}},
         "size": [640, 480], "samples": 9, "slices": 4, "legend": false, "unit": "m/s"})");
     EXPECT_EQ(scene.field, "V");
     EXPECT_EQ(scene.component, 2);
@@ -75,6 +77,10 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_EQ(scene.slicesAVoxel, 4);
     EXPECT_FALSE(scene.hasLegend);
     EXPECT_EQ(scene.unit, "m/s");
+    ASSERT_EQ(scene.effects.size(), 3u);
+    EXPECT_EQ(scene.effects[0].name, "bricks");
+    EXPECT_EQ(scene.effects[1].name, "isosurfaces");
+    EXPECT_EQ(scene.effects[2].name, "shading");
 }
 
 TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
@@ -114,6 +120,16 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
          "transfer_function.stops[0].opacity: expected a number"},
         {R"({"version": 1, "transfer_function": {"map": "gray", "stops": [{"value": 1, "opacity": 1}]}})",
          "transfer_function.map: can't stand beside stops"},
+        {R"({"version": 1, "effects": {"glow": {}}})", "effects: unknown key \"glow\"; it knows bricks"},
+        {R"({"version": 1, "effects": {"shading": {"ambient": 2}}})",
+         "effects.shading.ambient: expected a number from 0 to 1"},
+        {R"({"version": 1, "effects": {"shading": {"light": [0, 0, 0]}}})",
+         "effects.shading.light: expected a dir"},
+        {R"({"version": 1, "effects": {"isosurfaces": {"surfaces": []}}})",
+         "effects.isosurfaces.surfaces: expected a list of 1 to 16"},
+        {R"({"version": 1, "effects": {"isosurfaces": {"surfaces": [{}]}}})",
+         "effects.isosurfaces.surfaces[0].value: expected a number"},
+        {R"({"version": 1, "effects": {"bricks": {"width": 0}}})", "effects.bricks.width: expected a number"},
         {R"({"version": 1, "clip": {"box": [0, 0, 0, 1, 0, 1]}})", "clip.box: expected"},
         {R"({"version": 1, "clip": {"planes": [{"normal": [0, 0, 0], "offset": 1}]}})",
          "clip.planes[0].normal: expected a direction"},

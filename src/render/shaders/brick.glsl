@@ -4,6 +4,8 @@ struct Brick {
     float spacing;
     ivec3 texel;  // the slot's first
     int isWhole;
+    ivec3 index;
+    int depth;
     float firstSlab;  // counted from the eye, the brick's nearest
     float padding[3];
 };

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "device/value_coding.h"
+#include "gl/gl_handles.h"
+#include "gl/shader_text.h"
+#include "mesh/field_range.h"
+#include "tessera/vec.h"
+
+namespace tessera {
+
+/// What an effect sets its uniforms by.
+struct EffectScene {
+    const GlFunctions& gl;
+    const GlProgram& program;
+    const ValueCoding& coding;  ///< of the channel shown
+    ValueRange range;           ///< of that channel in all bricks
+    double sizeWorld = 0;       ///< the longest side of the bricks' box
+    /// Of a ray: its opening in radians, or with parallel rays its width in world units.
+    double raySize = 0;
+
+    void set(const char* name, double value) const;
+    void set(const char* name, const Vec3d& value) const;
+};
+
+/// Something that a picture shows beside the volume itself. The shader is put together from the effects that
+/// a picture names, so one that it doesn't name leaves no text there, no uniform and no buffer.
+///
+/// An effect is a file of GLSL and one of C++ in render/effects. The GLSL has functions for some of the
+/// places named here; shaders/brick_fragment.glsl calls them.
+struct Effect {
+    std::string name;               ///< as scenes write it
+    std::vector<ShaderText> texts;  ///< in the order needed; one that effects share stands in the shader once
+    /// void f(inout vec4 shown, vec3 local, vec3 direction): a sample of the volume that is seen, its colour
+    /// and opacity.
+    std::string shade;
+    /// vec4 f(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction): what a slab has that is
+    /// thin, colour times opacity, and opacity; codes and places at both ends of the part in the mesh.
+    std::string sheet;
+    /// vec4 f(vec3 local): what is on a face of the brick, where the ray comes in or goes out.
+    std::string face;
+    bool needsAllBricks = false;  ///< those too of which the transfer function shows nothing
+    bool readsIndex = false;      ///< needs the pool's index of bricks
+    std::function<void(const EffectScene&)> setUniforms;
+};
+
+}  // namespace tessera

@@ -1,0 +1,46 @@
+#include <algorithm>
+
+#include "render/effects.h"
+#include "render/shaders.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::size_t kMostSurfaces = 16;
+
+}  // namespace
+
+Effect isosurfacesEffect(std::vector<Isosurface> surfaces, const Vec3d& towardsLight) {
+    if (surfaces.empty() || surfaces.size() > kMostSurfaces)
+        throw InputError("a picture has 1 to 16 isosurfaces");
+    std::stable_sort(surfaces.begin(), surfaces.end(),
+                     [](const Isosurface& a, const Isosurface& b) { return a.value < b.value; });
+    namespace text = shaders::render;
+    Effect effect;
+    effect.name = "isosurfaces";
+    effect.texts = {text::kGradient, text::kLight, text::kIsosurfaces};
+    effect.sheet = "isosurfacesSheet";
+    effect.needsAllBricks = true;
+    effect.readsIndex = true;
+    effect.setUniforms = [surfaces, towardsLight](const EffectScene& scene) {
+        std::vector<std::array<float, 4>> shown;
+        std::vector<float> codes;
+        for (const Isosurface& surface : surfaces) {
+            shown.push_back({float(surface.color[0]), float(surface.color[1]), float(surface.color[2]),
+                             float(surface.opacity)});
+            codes.push_back(float(scene.coding.encode(surface.value)));
+        }
+        const GLuint program = scene.program.id();
+        const auto count = GLsizei(surfaces.size());
+        scene.gl.ProgramUniform4fv(program, scene.program.uniform("isosurfaces"), count, shown[0].data());
+        scene.gl.ProgramUniform1fv(program, scene.program.uniform("isosurfaceCodes"), count, codes.data());
+        scene.gl.ProgramUniform1i(program, scene.program.uniform("isosurfaceCount"), count);
+        const double length = glm::length(towardsLight);
+        scene.set("isosurfaceLight", length > 0 ? towardsLight / length : Vec3d(0));
+    };
+    return effect;
+}
+
+}  // namespace tessera

@@ -1,0 +1,32 @@
+#include "render/effects.h"
+#include "render/shaders.h"
+
+namespace tessera {
+
+namespace {
+
+/// Values that change by their whole range over so many sizes of the scene are taken as even.
+constexpr double kEvenSizes = 5;
+
+}  // namespace
+
+Effect shadingEffect(const Shading& shading) {
+    namespace text = shaders::render;
+    Effect effect;
+    effect.name = "shading";
+    effect.texts = {text::kGradient, text::kLight, text::kShading};
+    effect.shade = "shadingShade";
+    effect.readsIndex = true;
+    effect.setUniforms = [shading](const EffectScene& scene) {
+        const double length = glm::length(shading.towardsLight);
+        scene.set("shadingLight", length > 0 ? shading.towardsLight / length : Vec3d(0));
+        scene.gl.ProgramUniform4f(scene.program.id(), scene.program.uniform("shadingWeights"),
+                                  float(shading.ambient), float(shading.diffuse), float(shading.specular),
+                                  float(shading.shininess));
+        const double codes = scene.coding.encode(scene.range.max) - scene.coding.encode(scene.range.min);
+        scene.set("shadingEven", codes / (kEvenSizes * scene.sizeWorld));
+    };
+    return effect;
+}
+
+}  // namespace tessera
