@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/effects.h"
+#include "render/effects/bricks.h"
+#include "render/effects/isosurfaces.h"
+#include "render/effects/shading.h"
 #include "scene/colour_maps.h"
 #include "tessera/error.h"
 

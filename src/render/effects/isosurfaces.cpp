@@ -1,6 +1,7 @@
+#include "render/effects/isosurfaces.h"
+
 #include <algorithm>
 
-#include "render/effects.h"
 #include "render/shaders.h"
 #include "tessera/error.h"
 

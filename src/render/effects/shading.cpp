@@ -1,4 +1,5 @@
-#include "render/effects.h"
+#include "render/effects/shading.h"
+
 #include "render/shaders.h"
 
 namespace tessera {
