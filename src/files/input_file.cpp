@@ -32,7 +32,7 @@ void readAt(int descriptor, const std::string& path, std::size_t at, char* bytes
 }
 
 void checkStatus(const std::string& path, const struct stat& status) {
-    if (S_ISDIR(status.st_mode)) throw InputError(path + ": is a directory, expected a mesh file");
+    if (S_ISDIR(status.st_mode)) throw InputError(path + ": is a directory, expected a file");
     if (!S_ISREG(status.st_mode)) throw InputError(path + ": isn't a regular file");
     if (status.st_size == 0) throw InputError(path + ": the file is empty");
 }

@@ -24,7 +24,9 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kHistogramBins = 32;
+constexpr std::size_t kHistogramBins = 64;
+/// 16 bytes each, and three or sixteen more while they are written.
+constexpr std::int64_t kMostPixels = 200'000'000;
 /// Kept free on the right.
 constexpr int kLegendPixels = 160;
 
@@ -34,6 +36,9 @@ Scene sceneOf(const RenderRequest& request) {
     if (request.component) scene.component = request.component;
     if (request.size) scene.width = (*request.size)[0], scene.height = (*request.size)[1];
     if (request.samplesAPixel) scene.samplesAPixel = *request.samplesAPixel;
+    if (std::int64_t(scene.width) * scene.height > kMostPixels)
+        throw InputError(fmt::format("a picture of {} x {} pixels is larger than {} million pixels",
+                                     scene.width, scene.height, kMostPixels / 1'000'000));
     for (const std::string& name : request.without) {
         const auto isNamed = [&](const Effect& effect) { return effect.name == name; };
         if (std::erase_if(scene.effects, isNamed) == 0)
@@ -248,8 +253,12 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
 
     const std::array<double, 2> shownRange = shownRangeOf(scene.function, picture.range);
     RenderOptions options;
-    options.camera = cameraOf(scene, bounds, isExr ? 0 : kLegendPixels);
-    options.function = functionOf(scene.function, picture.range, histogramOf(stored.bricks, shownRange));
+    try {
+        options.camera = cameraOf(scene, bounds, isExr ? 0 : kLegendPixels);
+        options.function = functionOf(scene.function, picture.range, histogramOf(stored.bricks, shownRange));
+    } catch (const InputError& error) {
+        throw InputError(request.scene + (request.scene.empty() ? "" : ": ") + error.what());
+    }
     const Vec3d size = bounds.size();
     options.layerWorld = scene.layerWorld.value_or(std::max({size.x, size.y, size.z}) / 20);
     options.slicesAVoxel = scene.slicesAVoxel;

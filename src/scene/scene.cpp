@@ -16,8 +16,8 @@ namespace {
 constexpr double kMargin = 0.06;
 /// Stops along a map; between them values are linear, so a logarithmic scale needs many.
 constexpr int kSteps = 64, kLogarithmicSteps = 512;
-/// Of the rarest values; the most frequent ones have none.
-constexpr double kMostOpacity = 0.6;
+/// Of the rarest values, and of the most frequent ones, which show where the mesh is.
+constexpr double kMostOpacity = 0.6, kLeastOpacity = 0.004;
 
 double opacityAt(const std::vector<std::array<double, 2>>& opacities, double share) {
     const auto above = std::find_if(opacities.begin(), opacities.end(),
@@ -33,9 +33,13 @@ std::vector<std::array<double, 2>> opacitiesOf(std::span<const double> histogram
     const double most = histogram.empty() ? 0 : *std::max_element(histogram.begin(), histogram.end());
     if (!(most > 0)) return {{0, kMostOpacity}};
     std::vector<std::array<double, 2>> opacities;
-    for (std::size_t bin = 0; bin < histogram.size(); ++bin)
-        opacities.push_back({(double(bin) + 0.5) / double(histogram.size()),
-                             kMostOpacity * (1 - std::pow(histogram[bin] / most, 0.3))});
+    for (std::size_t bin = 0; bin < histogram.size(); ++bin) {
+        const double opacity =
+            std::max(kLeastOpacity, kMostOpacity * (1 - std::pow(histogram[bin] / most, 0.3)));
+        // Even over most of the bin: what half the mesh has may lie anywhere in it.
+        for (const double at : {0.1, 0.9})
+            opacities.push_back({(double(bin) + at) / double(histogram.size()), opacity});
+    }
     return opacities;
 }
 
@@ -87,9 +91,13 @@ Camera cameraOf(const Scene& scene, const Box3d& boundsWorld, int legendPixels) 
         lookAlong(from.direction);
         return fitted(camera, boundsWorld, from.isParallel, scene.hasLegend ? legendPixels : 0);
     }
+    const Vec3d target = from.targetWorld.value_or(0.5 * (boundsWorld.min + boundsWorld.max));
+    if (target == *from.eyeWorld)
+        throw InputError(
+            "the eye is in the middle of the data, which it would look at: camera.target is missing");
     camera.eyeWorld = *from.eyeWorld;
     camera.heightWorld = from.heightWorld;
-    lookAlong(from.targetWorld.value_or(0.5 * (boundsWorld.min + boundsWorld.max)) - *from.eyeWorld);
+    lookAlong(target - *from.eyeWorld);
     viewOf(camera);
     return camera;
 }

@@ -201,7 +201,9 @@ TEST(SceneFunction, WithoutOpacitiesShowsWhatIsRare) {
     const std::vector<double> histogram{0.9, 0.05, 0, 0.05};
     const TransferFunction made = functionOf({}, {0, 4}, histogram);
     checkTransferFunction(made);
-    EXPECT_LT(shownAt(made, 0.5)[3], 0.01);
+    EXPECT_LT(shownAt(made, 0.2)[3], 0.01) << "but it isn't nothing";
+    EXPECT_GT(shownAt(made, 0.2)[3], 0);
+    EXPECT_LT(shownAt(made, 0.8)[3], 0.01);
     EXPECT_GT(shownAt(made, 1.5)[3], 0.3);
     EXPECT_NEAR(shownAt(made, 2.5)[3], 0.6, 1e-9);
     // One value, and none of a histogram.
