@@ -100,7 +100,7 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
             ->group(group);
 }
 
-void addCommonOptions(CLI::App& command, CommonOptions& options) {
+void addCommonOptions(CLI::App& command, CommonOptions& options, bool readsMesh = true) {
     command
         .add_option("--threads", options.threads,
                     "worker threads (default: one for every processor); the result never depends on it")
@@ -109,7 +109,7 @@ void addCommonOptions(CLI::App& command, CommonOptions& options) {
                      "print nothing but errors, and a warning where a result isn't what was asked for");
     command.add_option("--json", options.jsonPath,
                        "write a report as JSON to this file, or to standard output for -");
-    addReaderOptions(command, options.reader);
+    if (readsMesh) addReaderOptions(command, options.reader);
 }
 
 /// How to sample, without --algorithm: for commands that run several.
@@ -398,7 +398,7 @@ void addRenderOptions(CLI::App& command, RenderArguments& a) {
                      "tell what each effect costs, and how much of the picture it changes");
     command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
         ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
-    addCommonOptions(command, a.common);
+    addCommonOptions(command, a.common, false);
     command.footer(
         "Examples:\n  tessera render flow.vdb -o flow.png\n"
         "  tessera render flow.vdb --scene scene.json -o flow.png --size 1920x1080 --samples 9");

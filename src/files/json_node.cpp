@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/text.h"
 #include "files/input_file.h"
-#include "files/json_parse.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -17,6 +18,22 @@ std::string countText(std::size_t count) {
     return count < std::size(kWords) ? kWords[count] : std::to_string(count);
 }
 
+/// The library would take the last of several keys of one name.
+nlohmann::json parseOnce(const std::string& text) {
+    constexpr int kDeepest = 32;
+    std::vector<std::set<std::string>> keys;  // of the objects that are open
+    return nlohmann::json::parse(
+        text, [&](int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+            using Event = nlohmann::json::parse_event_t;
+            if (depth > kDeepest) throw InputError("nested more than 32 deep");
+            if (event == Event::object_start) keys.emplace_back();
+            if (event == Event::object_end) keys.pop_back();
+            if (event == Event::key && !keys.back().insert(parsed.get<std::string>()).second)
+                throw InputError("the key \"" + parsed.get<std::string>() + "\" stands twice in one object");
+            return true;
+        });
+}
+
 }  // namespace
 
 JsonNode::JsonNode(std::shared_ptr<const std::string> path, std::shared_ptr<const nlohmann::json> root,
@@ -24,11 +41,14 @@ JsonNode::JsonNode(std::shared_ptr<const std::string> path, std::shared_ptr<cons
     : path_(std::move(path)), root_(std::move(root)), json_(&json), place_(std::move(place)) {}
 
 JsonNode JsonNode::read(const std::string& path, const std::string& what) {
+    const std::string text = readWholeFile(path);
     std::shared_ptr<const nlohmann::json> root;
     try {
-        root = std::make_shared<const nlohmann::json>(parseJson<nlohmann::json>(readWholeFile(path)));
+        root = std::make_shared<const nlohmann::json>(parseOnce(text));
     } catch (const nlohmann::json::exception& error) {
         throw InputError(path + ": not JSON: " + error.what());
+    } catch (const InputError& error) {
+        throw InputError(path + ": " + error.what());
     }
     JsonNode node(std::make_shared<const std::string>(path + ": " + what), root, *root, "");
     if (!root->is_object()) node.fail("an object");

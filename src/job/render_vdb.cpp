@@ -25,10 +25,8 @@ namespace tessera {
 namespace {
 
 constexpr std::size_t kHistogramBins = 64;
-/// 16 bytes each, and three or sixteen more while they are written.
+/// 16 bytes each, and up to 20 more while they are written.
 constexpr std::int64_t kMostPixels = 200'000'000;
-/// Kept free on the right.
-constexpr int kLegendPixels = 160;
 
 Scene sceneOf(const RenderRequest& request) {
     Scene scene = request.scene.empty() ? Scene{} : readScene(request.scene);
@@ -37,8 +35,9 @@ Scene sceneOf(const RenderRequest& request) {
     if (request.size) scene.width = (*request.size)[0], scene.height = (*request.size)[1];
     if (request.samplesAPixel) scene.samplesAPixel = *request.samplesAPixel;
     if (std::int64_t(scene.width) * scene.height > kMostPixels)
-        throw InputError(fmt::format("a picture of {} x {} pixels is larger than {} million pixels",
-                                     scene.width, scene.height, kMostPixels / 1'000'000));
+        throw InputError(fmt::format("{}a picture of {} x {} pixels is larger than {} million pixels",
+                                     request.size ? "" : request.scene + ": ", scene.width, scene.height,
+                                     kMostPixels / 1'000'000));
     for (const std::string& name : request.without) {
         const auto isNamed = [&](const Effect& effect) { return effect.name == name; };
         if (std::erase_if(scene.effects, isNamed) == 0)
@@ -149,24 +148,23 @@ void writeLight(const std::string& path, const RgbaImage& image, const Execution
     writeExr(path, exr, execution);
 }
 
-void addLegend(const Scene& scene, const TransferFunction& function, const std::string& title,
-               const std::array<double, 2>& range, RgbImage& picture, Job& job) {
+LegendOptions legendOf(const Scene& scene, const std::string& title, const std::array<double, 2>& range) {
     LegendOptions legend;
     legend.title = scene.unit.empty() ? title : fmt::format("{} [{}]", title, scene.unit);
     legend.min = range[0];
     legend.max = range[1];
     legend.isLogarithmic = scene.function.isLogarithmic && scene.function.stops.empty();
-    const auto colourAt = [&](double value) {
-        // The colour of a stop without opacity counts too.
-        TransferFunction solid = function;
-        for (TransferFunction::Stop& stop : solid.stops) stop.opacity = 1;
-        const std::array<double, 4> shown = shownAt(solid, value);
+    return legend;
+}
+
+/// A function's colours, those of stops without opacity too.
+std::function<Rgb(double)> coloursOf(TransferFunction function) {
+    for (TransferFunction::Stop& stop : function.stops) stop.opacity = 1;
+    return [function](double value) {
+        const std::array<double, 4> shown = shownAt(function, value);
         const auto byte = [](double v) { return std::uint8_t(std::lround(255 * std::clamp(v, 0.0, 1.0))); };
         return Rgb{byte(shown[0]), byte(shown[1]), byte(shown[2])};
     };
-    if (!putLegend(picture, legend, colourAt))
-        job.warn(fmt::format("a picture of {} x {} pixels has no room for a legend", picture.width,
-                             picture.height));
 }
 
 /// Draws the picture again without each of its effects. The first drawing of all, which has made shaders, is
@@ -220,13 +218,10 @@ std::string explanation(const RenderedPicture& picture, std::size_t width) {
 
 }  // namespace
 
-RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
-    checkOutputPaths({request.input, request.scene},
-                     {{"--output", request.output}, {"--json", job.reportPath}});
+namespace {
+
+RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, VdbFile& file, Job& job) {
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
-    checkWritable(request.output);
-    const Scene scene = sceneOf(request);
-    VdbFile file = readVdb(request.input);
     const OutputField& field = chooseField(file, scene.field);
     const ShownChannel channel(field, scene.component);
     const Box3d bounds = coveredBounds(file);
@@ -252,13 +247,15 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
         for (const std::string& note : stored.notes) job.say(note + "\n");
 
     const std::array<double, 2> shownRange = shownRangeOf(scene.function, picture.range);
+    const LegendOptions legend = legendOf(scene, channel.title(), shownRange);
+    const bool wantsLegend = scene.hasLegend && !isExr;
+    const int besides = wantsLegend ? legendPixels(legend, scene.width, scene.height) : 0;
+    if (wantsLegend && besides == 0)
+        job.warn(
+            fmt::format("a picture of {} x {} pixels has no room for a legend", scene.width, scene.height));
     RenderOptions options;
-    try {
-        options.camera = cameraOf(scene, bounds, isExr ? 0 : kLegendPixels);
-        options.function = functionOf(scene.function, picture.range, histogramOf(stored.bricks, shownRange));
-    } catch (const InputError& error) {
-        throw InputError(request.scene + (request.scene.empty() ? "" : ": ") + error.what());
-    }
+    options.camera = cameraOf(scene, bounds, besides);
+    options.function = functionOf(scene.function, picture.range, histogramOf(stored.bricks, shownRange));
     const Vec3d size = bounds.size();
     options.layerWorld = scene.layerWorld.value_or(std::max({size.x, size.y, size.z}) / 20);
     options.slicesAVoxel = scene.slicesAVoxel;
@@ -285,14 +282,14 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
     const RgbaImage image = draw(options, picture.counts);
     if (std::none_of(image.pixels.begin(), image.pixels.end(), [](const Rgba& p) { return p[3] > 0; }))
         throw InputError(
-            fmt::format("{}: nothing of {} is in the picture: the camera, a clip or the transfer "
+            fmt::format("nothing of {} is in the picture: the camera, a clip or the transfer "
                         "function leaves nothing to see",
-                        request.scene.empty() ? request.input : request.scene, channel.title()));
+                        channel.title()));
     if (isExr) {
         writeLight(request.output, image, job.execution);
     } else {
         RgbImage shown = overGround(image, scene.ground);
-        if (scene.hasLegend) addLegend(scene, options.function, channel.title(), shownRange, shown, job);
+        if (wantsLegend) putLegend(shown, legend, coloursOf(options.function));
         writePng(request.output, shown);
     }
     if (request.explains) picture.effects = explainEffects(options, image, picture.counts, draw);
@@ -309,6 +306,29 @@ RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
                     picture.range.max, picture.counts.bricks, picture.bricks, picture.counts.drawMs));
     if (request.explains) job.say(explanation(picture, job.textWidth));
     return picture;
+}
+
+}  // namespace
+
+RenderedPicture renderVdb(const RenderRequest& request, Job& job) {
+    checkOutputPaths({request.input, request.scene},
+                     {{"--output", request.output}, {"--json", job.reportPath}});
+    if (request.explains && request.output == "-" && job.reportPath.empty())
+        throw InputError("--explain needs --json where the picture goes to standard output");
+    chooseFormat(request.output, {}, {"png", "exr"});
+    checkWritable(request.output);
+    checkReportPath(job);
+    const Scene scene = sceneOf(request);
+    VdbFile file = readVdb(request.input);
+    try {
+        return drawScene(request, scene, file, job);
+    } catch (const InputError& error) {
+        // What doesn't fit the data was asked for by the scene, or by an option.
+        const std::string why = error.what();
+        const bool isOfInput = why.starts_with(request.input + ":");
+        if (isOfInput || request.field || request.component) throw;
+        throw InputError((request.scene.empty() ? request.input : request.scene) + ": " + why);
+    }
 }
 
 Json renderedJson(const RenderRequest& request, const RenderedPicture& picture) {

@@ -121,8 +121,8 @@ std::vector<std::string> tickLabels(const ColourRange& range, const std::functio
         for (int t = 0; t < kTicks; ++t) {
             std::array<char, 40> text{};
             double value = valueAt(double(t) / (kTicks - 1));
-            // The rounding of a tick at zero must not show as 1e-17.
-            if (std::abs(value) < 1e-12 * (range.max - range.min)) value = 0;
+            // The rounding of a tick between both signs at zero must not show as 1e-17.
+            if (range.min < 0 && std::abs(value) < 1e-12 * (range.max - range.min)) value = 0;
             std::snprintf(text.data(), text.size(), "%.*g", digits, value);
             labels.emplace_back(text.data());
         }
@@ -233,24 +233,47 @@ RgbImage overGround(const RgbaImage& image, const std::array<double, 3>& ground)
     return result;
 }
 
-bool putLegend(RgbImage& picture, const LegendOptions& options,
-               const std::function<Rgb(double value)>& colourAt) {
-    const auto valueAt = [&](double share) {
+namespace {
+
+/// How a legend is laid out.
+struct LegendShape {
+    std::function<double(double)> valueAt;  ///< of a share
+    std::vector<std::string> labels;
+    int titleHeight = 0, barHeight = 0, width = 0, height = 0;
+    bool fits = false;
+};
+
+LegendShape shapeOf(const LegendOptions& options, int pictureWidth, int pictureHeight) {
+    LegendShape shape;
+    shape.valueAt = [options](double share) {
         return options.isLogarithmic ? options.min * std::pow(options.max / options.min, share)
                                      : options.min + share * (options.max - options.min);
     };
-    const std::vector<std::string> labels = tickLabels({options.min, options.max}, valueAt);
-    const int titleHeight = options.title.empty() ? 0 : kGlyphHeight * kTextScale + kMargin;
-    const int width = std::max(kBarWidth + 10 + widestOf(labels), textWidth(options.title)) + 2 * kMargin;
-    const int barHeight = std::min(picture.height / 2, 400);
-    const int height = barHeight + titleHeight + 2 * kMargin;
-    if (barHeight < kSmallestHeight || width + 2 * kMargin > picture.width) return false;
-    const int left = picture.width - width - kMargin, top = (picture.height - height) / 2;
-    fillBox(picture, left, top, width, height, kPaper);
+    shape.labels = tickLabels({options.min, options.max}, shape.valueAt);
+    shape.titleHeight = options.title.empty() ? 0 : kGlyphHeight * kTextScale + kMargin;
+    shape.width = std::max(kBarWidth + 10 + widestOf(shape.labels), textWidth(options.title)) + 2 * kMargin;
+    shape.barHeight = std::min(pictureHeight / 2, 400);
+    shape.height = shape.barHeight + shape.titleHeight + 2 * kMargin;
+    shape.fits = shape.barHeight >= kSmallestHeight && 2 * (shape.width + kMargin) <= pictureWidth;
+    return shape;
+}
+
+}  // namespace
+
+int legendPixels(const LegendOptions& options, int pictureWidth, int pictureHeight) {
+    const LegendShape shape = shapeOf(options, pictureWidth, pictureHeight);
+    return shape.fits ? shape.width + kMargin : 0;
+}
+
+void putLegend(RgbImage& picture, const LegendOptions& options,
+               const std::function<Rgb(double value)>& colourAt) {
+    const LegendShape shape = shapeOf(options, picture.width, picture.height);
+    if (!shape.fits) return;
+    const int left = picture.width - shape.width - kMargin, top = (picture.height - shape.height) / 2;
+    fillBox(picture, left, top, shape.width, shape.height, kPaper);
     drawText(picture, left + kMargin, top + kMargin, options.title);
-    drawBar(picture, left + kMargin, top + kMargin + titleHeight, barHeight, labels,
-            [&](double share) { return colourAt(valueAt(share)); });
-    return true;
+    drawBar(picture, left + kMargin, top + kMargin + shape.titleHeight, shape.barHeight, shape.labels,
+            [&](double share) { return colourAt(shape.valueAt(share)); });
 }
 
 void writePng(const std::string& path, const RgbImage& image) {

@@ -65,9 +65,11 @@ struct LegendOptions {
     double min = 0, max = 1;     ///< at its ends
     bool isLogarithmic = false;  ///< equal factors of the value take equal parts of the bar
 };
-/// Puts a colour bar with labelled ticks onto the right of a picture, on paper of its own. @param colourAt of
-/// a value. False, and nothing is put, when the picture has no room for it.
-bool putLegend(RgbImage& picture, const LegendOptions& options,
+/// What a legend takes of the picture's width; 0 when the picture has no room for it.
+int legendPixels(const LegendOptions& options, int pictureWidth, int pictureHeight);
+/// Puts a colour bar with labelled ticks onto the right of a picture, on paper of its own, where there is
+/// room. @param colourAt of a value.
+void putLegend(RgbImage& picture, const LegendOptions& options,
                const std::function<Rgb(double value)>& colourAt);
 
 /// Throws IoError; nothing stands at `path` until the file is whole.

@@ -23,11 +23,15 @@ constexpr std::size_t kMostClips = 32;
 /// Pixels are closed after so many parts of the bricks.
 constexpr std::size_t kParts = 12;
 constexpr std::size_t kFewBricks = 64;
+/// In sizes of the data.
+constexpr double kFarthest = 1e6;
 
 /// As the shaders have them.
 struct DeviceBrick {
     std::array<float, 3> low;
     float spacing;
+    std::array<float, 3> high;
+    float besides;
     std::array<std::int32_t, 3> texel;
     std::int32_t isWhole;
     std::array<std::int32_t, 3> index;
@@ -56,11 +60,11 @@ class Scene {
   public:
     Scene(const BrickPool& pool, const BrickFrame& frame, std::span<const PlacedBrick> bricks,
           const RenderOptions& options)
-        : pool_(pool), frame_(frame), options_(options), view_(viewOf(options.camera)) {
-        const Vec3d& eye = options.camera.eyeWorld;
-        for (const HalfSpace& half : options.within)
-            clips_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye)});
-        seen_ = clips_;
+        : pool_(pool),
+          frame_(frame),
+          options_(options),
+          view_(viewOf(options.camera)),
+          eye_(options.camera.eyeWorld) {
         needsAll_ = std::any_of(options.effects.begin(), options.effects.end(),
                                 [](const Effect& effect) { return effect.needsAllBricks; });
         for (const PlacedBrick& brick : bricks) {
@@ -71,6 +75,10 @@ class Scene {
             range_.min = std::min(range_.min, brick.range.min);
             range_.max = std::max(range_.max, brick.range.max);
         }
+        if (!bricks.empty()) placeEye();
+        for (const HalfSpace& half : options.within)
+            clips_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye_)});
+        seen_ = clips_;
         const double wide = view_.wide, high = view_.high;
         seen_.push_back({view_.forward, 0});
         for (const double sign : {-1.0, 1.0}) {
@@ -110,8 +118,7 @@ class Scene {
         for (const PlacedBrick& brick : bricks)
             if (isSeen(brick)) seen.push_back(&brick), keys.push_back(brick.key);
         const double edge = frame_.rootSpacingWorld * frame_.cells;
-        const Viewpoint from{(options_.camera.eyeWorld - frame_.originWorld) / edge,
-                             view_.isParallel ? view_.forward : Vec3d(0)};
+        const Viewpoint from{(eye_ - frame_.originWorld) / edge, view_.isParallel ? view_.forward : Vec3d(0)};
         std::vector<const PlacedBrick*> ordered;
         for (const std::size_t i : visibilityOrder(keys, from)) ordered.push_back(seen[i]);
         return ordered;
@@ -127,7 +134,11 @@ class Scene {
         const double slab = spacing / options_.slicesAVoxel;
         DeviceBrick placed{};
         placed.low = floats(box.min);
+        placed.high = floats(box.max);
         placed.spacing = float(spacing);
+        double farthest = 1;  // parallel rays are as far apart everywhere
+        if (!view_.isParallel) farthest = glm::length(glm::max(glm::abs(box.min), glm::abs(box.max)));
+        placed.besides = float(1.5 * raySize() * farthest + 1e-6 * glm::length(box.min));
         placed.texel = {texel.x, texel.y, texel.z};
         placed.isWhole = brick.isWhole;
         placed.index = {brick.key.index.x, brick.key.index.y, brick.key.index.z};
@@ -139,36 +150,81 @@ class Scene {
     std::vector<DeviceStop> stops() const {
         const ValueCoding& coding = pool_.coding().codings()[std::size_t(options_.channel)];
         std::vector<DeviceStop> stops;
-        for (const TransferFunction::Stop& stop : options_.function.stops)
+        // Far from all values codes would overflow: there the function at the ends of what there is counts.
+        const double width = std::max(range_.width(), 1e-6 * std::abs(range_.max));
+        const double low = range_.min - width, high = range_.max + width;
+        const auto add = [&](const TransferFunction::Stop& stop, double value) {
             stops.push_back(
                 {{float(stop.color[0]), float(stop.color[1]), float(stop.color[2]), float(stop.opacity)},
-                 float(coding.encode(stop.value)),
+                 float(coding.encode(value)),
                  {}});
+        };
+        const auto& all = options_.function.stops;
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            const double value = all[i].value;
+            const bool isBelow = value<low, isAbove = value> high;
+            const auto between = [&](const TransferFunction::Stop& a, const TransferFunction::Stop& b,
+                                     double at) {
+                // In halves, as the difference of the largest numbers isn't one.
+                const double t = (at / 2 - a.value / 2) / (b.value / 2 - a.value / 2);
+                TransferFunction::Stop stop;
+                stop.opacity = glm::mix(a.opacity, b.opacity, t);
+                for (std::size_t c = 0; c < 3; ++c) stop.color[c] = glm::mix(a.color[c], b.color[c], t);
+                return stop;
+            };
+            if (isBelow) {
+                if (i + 1 == all.size())
+                    add(all[i], low);
+                else if (all[i + 1].value >= low)
+                    add(between(all[i], all[i + 1], low), low);
+            } else if (isAbove) {
+                add(i == 0 ? all[0] : between(all[i - 1], all[i], high), high);
+                break;
+            } else {
+                add(all[i], value);
+            }
+        }
         return stops;
     }
 
     EffectScene forEffects(const GlFunctions& gl, const GlProgram& program) const {
-        const Camera& camera = options_.camera;
-        const double rays = camera.heightPixels * std::sqrt(options_.samplesAPixel);
         const Vec3d size = box_.size();
         return {gl,
                 program,
                 pool_.coding().codings()[std::size_t(options_.channel)],
                 range_,
                 std::max({size.x, size.y, size.z}),
-                2 * view_.high / rays};
+                raySize()};
     }
 
   private:
     Box3d fromEye(const PlacedBrick& brick) const {
         const Box3d box = frame_.boxWorld(brick.key);
-        return {box.min - options_.camera.eyeWorld, box.max - options_.camera.eyeWorld};
+        return {box.min - eye_, box.max - eye_};
+    }
+    double raySize() const {
+        return 2 * view_.high / (options_.camera.heightPixels * std::sqrt(options_.samplesAPixel));
+    }
+    /// Of the floats that the shaders count with nothing may be lost.
+    void placeEye() {
+        double nearest = 0, coarsest = 0;
+        for (int a = 0; a < 3; ++a)
+            nearest += std::min(view_.forward[a] * (box_.min[a] - eye_[a]),
+                                view_.forward[a] * (box_.max[a] - eye_[a]));
+        coarsest = frame_.rootSpacingWorld / options_.slicesAVoxel;
+        // Parallel rays may begin anywhere, but slabs are counted from the eye.
+        if (view_.isParallel && nearest > 0)
+            eye_ += std::floor(nearest / coarsest) * coarsest * view_.forward;
+        const Vec3d size = box_.size(), far = glm::max(glm::abs(box_.min - eye_), glm::abs(box_.max - eye_));
+        if (!(glm::length(far) <= kFarthest * glm::length(size)))
+            throw InputError("the camera is farther away than a million times the size of the data");
     }
 
     const BrickPool& pool_;
     const BrickFrame& frame_;
     const RenderOptions& options_;
     CameraView view_;
+    Vec3d eye_;
     std::vector<HalfSpace> clips_, seen_;
     bool needsAll_ = false;
     Box3d box_;         // of all bricks
@@ -354,6 +410,7 @@ void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std:
     gl.Viewport(0, 0, tile.width, tile.height);
     const std::array<float, 4> nothing{};
     const float farthest = 1;
+    gl.DepthMask(GL_TRUE);  // the tile before may have left it off
     gl.ClearNamedFramebufferfv(target.id(), GL_COLOR, 0, nothing.data());
     gl.ClearNamedFramebufferfv(target.id(), GL_DEPTH, 0, &farthest);
     gl.BindVertexArray(vertices.id());

@@ -116,6 +116,8 @@ TransferFunction functionOf(const SceneFunction& function, const ValueRange& ran
         return result;
     }
     const auto [low, high] = shownRangeOf(function, range);
+    if (function.isLogarithmic && low > 0 && !std::isfinite(high / low))
+        throw InputError("a logarithmic scale can't span " + shortNumber(low) + " to " + shortNumber(high));
     if (function.isLogarithmic && !(low > 0))
         throw InputError("a logarithmic scale needs values above 0, and these begin at " +
                          shortNumber(low, 6) + ": give a range");

@@ -75,7 +75,8 @@ SceneFunction readFunction(const JsonNode& json) {
     }
     if (const auto range = json.find("range")) {
         const std::vector<double> ends = range->numbers(2);
-        if (!(ends[0] < ends[1])) range->fail("two numbers, the smaller one first");
+        if (!(ends[0] < ends[1]) || !std::isfinite(ends[1] - ends[0]))
+            range->fail("two numbers, the smaller one first");
         function.range = {ends[0], ends[1]};
     }
     if (const auto log = json.find("log")) function.isLogarithmic = log->flag();
@@ -113,7 +114,10 @@ void readClip(const JsonNode& json, std::vector<HalfSpace>& within) {
             plane.expectKeys({"normal", "offset"});
             const Vec3d normal = plane.at("normal").vector();
             const Vec3d direction = readDirection(plane.at("normal"));
-            within.push_back({direction, plane.at("offset").number() / glm::length(normal)});
+            const double offset = plane.at("offset").number() / glm::length(normal);
+            if (!std::isfinite(offset))
+                plane.at("offset").fail("a number that isn't so large beside the normal");
+            within.push_back({direction, offset});
         }
     }
 }

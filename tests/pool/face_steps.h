@@ -95,13 +95,16 @@ inline FaceSteps stepsOnFaces(const BrickPool& pool, const PoolTarget& target, c
             for (const int channel : channels) {
                 const auto stepOf = [&](auto&& at, double& largest) {
                     const double here = at(leaf, channel, local, largest);
-                    return std::abs(here - at(*other, channel, there, largest));
+                    const double beyond = at(*other, channel, there, largest);
+                    if (std::isfinite(here) != std::isfinite(beyond)) return double(INFINITY);
+                    return std::isfinite(here) ? std::abs(here - beyond) : 0.0;
                 };
                 double code = 0, value = 0;
                 const double texelStep = stepOf(texelsAt, code), valueStep = stepOf(valuesAt, value);
-                // A value that isn't finite has the code 0 and stands as it is in what was published.
+                // A value that isn't finite has the code 0 and stands as it is in what was published, on both
+                // sides or on none.
                 steps.texels = std::max(steps.texels, texelStep / roundingOf(pool.coding().format(), code));
-                if (std::isfinite(valueStep))
+                if (valueStep > 0)
                     steps.values =
                         std::max(steps.values, 4 * valueStep / roundingOf(SampleFormat::r32f, value));
             }

@@ -2,6 +2,8 @@
 struct Brick {
     vec3 low;
     float spacing;
+    vec3 high;      // bit by bit the low end of the next brick
+    float besides;  // how far around the box fragments are asked for
     ivec3 texel;  // the slot's first
     int isWhole;
     ivec3 index;

@@ -25,11 +25,18 @@ void main() {
     float spacing = bricks[number].spacing;
     vec3 from = (origin - bricks[number].low) / spacing;
     vec3 step = direction / spacing;
-    step = mix(step, vec3(1e-30), equal(step, vec3(0)));
-    vec3 a = -from / step, b = (float(CELLS) - from) / step;
-    vec3 enter = min(a, b), leave = max(a, b);
-    float begin = max(max(enter.x, max(enter.y, enter.z)), 0.0);
-    float end = min(leave.x, min(leave.y, leave.z));
+    float begin = 0.0, end = 1e38;
+    for (int a = 0; a < 3; ++a) {
+        float low = bricks[number].low[a], high = bricks[number].high[a];
+        if (direction[a] == 0.0) {
+            // Along a face: the brick above it has it.
+            if (!(low <= origin[a] && origin[a] < high)) discard;
+            continue;
+        }
+        float toLow = (low - origin[a]) / direction[a], toHigh = (high - origin[a]) / direction[a];
+        begin = max(begin, min(toLow, toHigh));
+        end = min(end, max(toLow, toHigh));
+    }
     for (int i = 0; i < clipCount; ++i) {
         float rise = dot(clips[i].xyz, direction), missing = clips[i].w - dot(clips[i].xyz, origin);
         if (rise > 0.0) begin = max(begin, missing / rise);
