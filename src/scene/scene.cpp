@@ -115,7 +115,8 @@ TransferFunction functionOf(const SceneFunction& function, const ValueRange& ran
         result.stops = function.stops;
         return result;
     }
-    const auto [low, high] = shownRangeOf(function, range);
+    const std::array<double, 2> ends = shownRangeOf(function, range);
+    const double low = ends[0], high = ends[1];
     if (function.isLogarithmic && low > 0 && !std::isfinite(high / low))
         throw InputError("a logarithmic scale can't span " + shortNumber(low) + " to " + shortNumber(high));
     if (function.isLogarithmic && !(low > 0))
