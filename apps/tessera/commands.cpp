@@ -79,7 +79,7 @@ int runRender(const RenderArguments& a) {
     if (!a.size.empty()) request.size = parsePictureSize("--size", a.size);
     if (!a.gl.empty()) request.platform = parseGlPlatform(a.gl);
     Session session(a.common, request.output);
-    session.writeReport(renderedJson(request, renderVdb(request, session.job)));
+    session.writeReport(renderedJson(request, renderScene(request, session.job)));
     return 0;
 }
 

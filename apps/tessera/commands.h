@@ -9,7 +9,7 @@
 #include "job/export_tets.h"
 #include "job/focus_trace.h"
 #include "job/paper_tables.h"
-#include "job/render_vdb.h"
+#include "job/render_scene.h"
 #include "job/verify_file.h"
 #include "options.h"
 

@@ -50,7 +50,7 @@ struct RenderedPicture {
 /// A .png is drawn over the scene's background, with its legend; an .exr has light in place of a screen's
 /// values, multiplied by the opacity A, without a background or legend. Throws InputError for a scene that
 /// doesn't fit the file, or that shows nothing, GlError, IoError.
-RenderedPicture renderVdb(const RenderRequest& request, Job& job);
+RenderedPicture renderScene(const RenderRequest& request, Job& job);
 Json renderedJson(const RenderRequest& request, const RenderedPicture& picture);
 
 }  // namespace tessera

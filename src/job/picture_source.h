@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mesh/field_range.h"
+#include "pool/brick_pool.h"
+#include "render/placed_bricks.h"
+#include "tessera/vec.h"
+
+namespace tessera {
+
+/// Of a ValueHistogram.
+inline constexpr std::size_t kHistogramBins = 64;
+
+/// Volume by value.
+class ValueHistogram {
+  public:
+    explicit ValueHistogram(const std::array<double, 2>& range) : range_(range), shares_(kHistogramBins) {}
+    /// What lies outside the range, or isn't finite, isn't counted.
+    void add(double value, double volume);
+    /// Of what was counted: bins of one width over the range.
+    std::vector<double> shares() const;
+
+  private:
+    std::array<double, 2> range_;
+    std::vector<double> shares_;
+    double all_ = 0;
+};
+
+/// What pictures are drawn of: the bricks of one field in a pool of an OpenGL device.
+class PictureSource {
+  public:
+    virtual ~PictureSource() = default;
+
+    /// Of the values, for a legend: "T", "|v|", "v 2".
+    virtual const std::string& title() const = 0;
+    /// Of what lies in the mesh.
+    virtual const Box3d& boundsWorld() const = 0;
+    /// Of the finite values, of which there are some.
+    virtual const ValueRange& range() const = 0;
+    /// Shares of the mesh's volume by value: bins of one width over a range.
+    virtual std::vector<double> histogram(const std::array<double, 2>& range) const = 0;
+
+    // What is to be drawn, as it is now:
+    virtual const BrickPool& pool() const = 0;
+    virtual const BrickFrame& frame() const = 0;
+    /// What pool().state() shows.
+    virtual std::span<const PlacedBrick> bricks() const = 0;
+};
+
+}  // namespace tessera

@@ -1,0 +1,180 @@
+#include "job/render_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "files/atomic_file.h"
+#include "job/output_paths.h"
+#include "job/scene_picture.h"
+#include "job/table_text.h"
+#include "job/vdb_source.h"
+#include "scene/scene_file.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+/// 16 bytes each, and up to 20 more while they are written.
+constexpr std::int64_t kMostPixels = 200'000'000;
+
+Scene sceneOf(const RenderRequest& request) {
+    Scene scene = request.scene.empty() ? Scene{} : readScene(request.scene);
+    if (request.field) scene.field = *request.field;
+    if (request.component) scene.component = request.component;
+    if (request.size) scene.width = (*request.size)[0], scene.height = (*request.size)[1];
+    if (request.samplesAPixel) scene.samplesAPixel = *request.samplesAPixel;
+    if (std::int64_t(scene.width) * scene.height > kMostPixels)
+        throw InputError(fmt::format("{}a picture of {} x {} pixels is larger than {} million pixels",
+                                     request.size ? "" : request.scene + ": ", scene.width, scene.height,
+                                     kMostPixels / 1'000'000));
+    for (const std::string& name : request.without) {
+        const auto isNamed = [&](const Effect& effect) { return effect.name == name; };
+        if (std::erase_if(scene.effects, isNamed) == 0)
+            throw InputError(fmt::format("--without: the scene has no effect '{}'", name));
+    }
+    return scene;
+}
+
+/// Draws the picture again without each of its effects. The first drawing of all, which has made shaders, is
+/// done again too; of two the faster one counts.
+template <class Draw>
+std::vector<EffectCost> explainEffects(const RenderOptions& options, const RgbaImage& image,
+                                       RenderCounts& whole, const Draw& draw) {
+    const auto fastest = [&](const RenderOptions& of, RgbaImage& drawn) {
+        RenderCounts counts, again;
+        drawn = draw(of, counts);
+        draw(of, again);
+        counts.drawMs = std::min(counts.drawMs, again.drawMs);
+        return counts;
+    };
+    RgbaImage drawn;
+    whole = fastest(options, drawn);
+    std::vector<EffectCost> costs;
+    for (std::size_t i = 0; i < options.effects.size(); ++i) {
+        RenderOptions without = options;
+        without.effects.erase(without.effects.begin() + std::ptrdiff_t(i));
+        const RenderCounts counts = fastest(without, drawn);
+        EffectCost& cost = costs.emplace_back();
+        cost.name = options.effects[i].name;
+        cost.drawMs = whole.drawMs - counts.drawMs;
+        cost.bricks = whole.bricks - counts.bricks;
+        double squares = 0;
+        for (std::size_t p = 0; p < image.pixels.size(); ++p)
+            for (std::size_t c = 0; c < 3; ++c) {
+                const double apart = double(image.pixels[p][c]) - double(drawn.pixels[p][c]);
+                squares += apart * apart;
+                cost.changesPixels += c == 0 && image.pixels[p] != drawn.pixels[p];
+            }
+        cost.changeRms = 255 * std::sqrt(squares / double(3 * image.pixels.size()));
+    }
+    return costs;
+}
+
+std::string explanation(const RenderedPicture& picture, std::size_t width) {
+    TableRows rows{{"", "bricks", "ms", "changed pixels", "RMS of 255"}};
+    rows.push_back({"the picture", std::to_string(picture.counts.bricks),
+                    fmt::format("{:.1f}", picture.counts.drawMs), "", ""});
+    for (const EffectCost& effect : picture.effects)
+        rows.push_back({"of it " + effect.name, fmt::format("{:+}", effect.bricks),
+                        fmt::format("{:+.1f}", effect.drawMs), std::to_string(effect.changesPixels),
+                        fmt::format("{:.2f}", effect.changeRms)});
+    return formatTable(rows, width) +
+           fmt::format("device memory: bricks {:.1f} MB, picture {:.1f} MB; {} draw calls\n",
+                       double(picture.poolBytes) * 1e-6, double(picture.counts.deviceBytes) * 1e-6,
+                       picture.counts.draws);
+}
+
+RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job& job) {
+    const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
+    GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
+    const auto source = openVdbSource(request.input, scene.field, scene.component, thread, job);
+    const ScenePicture asked = pictureOf(scene, *source, !isExr);
+    if (asked.lacksLegend)
+        job.warn(
+            fmt::format("a picture of {} x {} pixels has no room for a legend", scene.width, scene.height));
+    const auto state = source->pool().state();
+    SliceRenderer renderer(thread);
+    const auto draw = [&](const RenderOptions& of, RenderCounts& counts) {
+        return renderer.draw(source->pool(), *state, source->frame(), source->bricks(), of, job.execution,
+                             &counts);
+    };
+    RenderedPicture picture;
+    const RgbaImage image = draw(asked.options, picture.counts);
+    if (std::none_of(image.pixels.begin(), image.pixels.end(), [](const Rgba& p) { return p[3] > 0; }))
+        throw InputError(
+            fmt::format("nothing of {} is in the picture: the camera, a clip or the transfer "
+                        "function leaves nothing to see",
+                        source->title()));
+    if (isExr)
+        writeLight(request.output, image, job.execution);
+    else
+        writePng(request.output, onScreen(asked, image));
+    if (request.explains) picture.effects = explainEffects(asked.options, image, picture.counts, draw);
+    picture.field = source->title();
+    picture.platform = nameOf(thread.platform());
+    picture.device = thread.info().renderer;
+    picture.width = image.width;
+    picture.height = image.height;
+    picture.range = source->range();
+    picture.bricks = source->bricks().size();
+    picture.poolBytes = source->pool().deviceBytes();
+    job.say(
+        fmt::format("{}: {}, {} x {} pixels, values {:.6g} to {:.6g}; {} of {} bricks drawn in {:.0f} ms\n",
+                    request.output, picture.field, picture.width, picture.height, picture.range.min,
+                    picture.range.max, picture.counts.bricks, picture.bricks, picture.counts.drawMs));
+    if (request.explains) job.say(explanation(picture, job.textWidth));
+    return picture;
+}
+
+}  // namespace
+
+RenderedPicture renderScene(const RenderRequest& request, Job& job) {
+    checkOutputPaths({request.input, request.scene},
+                     {{"--output", request.output}, {"--json", job.reportPath}});
+    if (request.explains && request.output == "-" && job.reportPath.empty())
+        throw InputError("--explain needs --json where the picture goes to standard output");
+    chooseFormat(request.output, {}, {"png", "exr"});
+    checkWritable(request.output);
+    checkReportPath(job);
+    const Scene scene = sceneOf(request);
+    try {
+        return drawScene(request, scene, job);
+    } catch (const InputError& error) {
+        // What doesn't fit the data was asked for by the scene, or by an option.
+        const std::string why = error.what();
+        const bool isOfInput = why.starts_with(request.input + ":");
+        if (isOfInput || request.field || request.component) throw;
+        throw InputError((request.scene.empty() ? request.input : request.scene) + ": " + why);
+    }
+}
+
+Json renderedJson(const RenderRequest& request, const RenderedPicture& picture) {
+    Json json = documentHead("render");
+    json["input"] = request.input;
+    json["output"] = request.output;
+    if (!request.scene.empty()) json["scene"] = request.scene;
+    json["field"] = picture.field;
+    json["size"] = {picture.width, picture.height};
+    json["value_range"] = rangeJson(picture.range);
+    json["device"] = {{"platform", picture.platform}, {"renderer", picture.device}};
+    json["bricks"] = {{"total", picture.bricks}, {"drawn", picture.counts.bricks}};
+    json["draw_calls"] = picture.counts.draws;
+    json["device_bytes"] = {{"bricks", picture.poolBytes}, {"picture", picture.counts.deviceBytes}};
+    json["draw_ms"] = picture.counts.drawMs;
+    if (request.explains) {
+        json["effects"] = Json::array();
+        for (const EffectCost& effect : picture.effects)
+            json["effects"].push_back({{"name", effect.name},
+                                       {"draw_ms", effect.drawMs},
+                                       {"bricks", effect.bricks},
+                                       {"changed_pixels", effect.changesPixels},
+                                       {"change_rms_255", effect.changeRms}});
+    }
+    return json;
+}
+
+}  // namespace tessera

@@ -1,0 +1,152 @@
+#include "job/vdb_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.h"
+#include "job/vdb_contents.h"
+#include "pool/pool_target.h"
+#include "pool/stored_bricks.h"
+#include "tessera/error.h"
+#include "vdb/vdb_read.h"
+
+namespace tessera {
+
+namespace {
+
+/// One component of a field, or the length of a vector.
+class ShownChannel {
+  public:
+    ShownChannel(const OutputField& field, std::optional<int> component) : field_(field) {
+        if (component && *component >= field.components)
+            throw InputError(fmt::format("{} has {} components, counted from 0; there is no component {}",
+                                         field.name, field.components, *component));
+        if (component || field.components == 1) only_ = field.firstChannel + component.value_or(0);
+    }
+
+    /// A block of that channel alone.
+    std::shared_ptr<const Block> of(const Block& block) const {
+        auto shown = std::make_shared<Block>();
+        shown->lattice = block.lattice;
+        shown->box = block.box;
+        shown->channels = 1;
+        shown->coverage = block.coverage;
+        const std::size_t points = block.count();
+        shown->values.resize(points);
+        for (std::size_t p = 0; p < points; ++p) shown->values[p] = valueAt(block, p);
+        return shown;
+    }
+    std::string title() const {
+        if (field_.components == 1) return field_.name;
+        if (only_ < 0) return fmt::format("|{}|", field_.name);
+        return fmt::format("{} {}", field_.name, only_ - field_.firstChannel);
+    }
+
+  private:
+    float valueAt(const Block& block, std::size_t point) const {
+        const auto at = [&](int channel) {
+            return double(block.values[std::size_t(channel) * block.count() + point]);
+        };
+        if (only_ >= 0) return float(at(only_));
+        double square = 0;
+        for (int c = 0; c < field_.components; ++c)
+            square += at(field_.firstChannel + c) * at(field_.firstChannel + c);
+        return float(std::sqrt(square));
+    }
+
+    OutputField field_;
+    int only_ = -1;
+};
+
+BrickPool makePool(GlThread& thread, const BrickTree& tree, const ValueRange& range) {
+    TexelCoding coding({ValueCoding(range, SampleFormat::r32f)}, SampleFormat::r32f);
+    const std::int64_t edge = tree.brickCells() + 1;
+    PoolOptions options;
+    options.budgetBytes = std::int64_t(tree.leafCount()) * edge * edge * edge * coding.pointBytes();
+    // A little more, as atlases aren't of every size.
+    options.budgetBytes += options.budgetBytes / 8 + 64 * edge * edge * edge * coding.pointBytes();
+    return {thread, tree.brickCells(), std::move(coding), options};
+}
+
+class VdbSource : public PictureSource {
+  public:
+    VdbSource(VdbFile file, const ShownChannel& channel, GlThread& thread, Job& job)
+        : title_(channel.title()),
+          bounds_(coveredBounds(file)),
+          frame_{file.tree.originWorld(),
+                 file.tree.spacingWorld(levelOf(Depth(0), Depth(file.tree.levelCount() - 1))),
+                 file.tree.brickCells()} {
+        if (bounds_.empty()) throw InputError("no voxel lies in the mesh: nothing to draw");
+        StoredBricks stored =
+            showStored(file.tree, file.store, {file.layers, file.halfFloat, true}, job.execution);
+        file.store = BrickStore();
+        parallelFor(job.execution, std::int64_t(stored.bricks.size()), [&](std::int64_t i) {
+            ShownBrick& brick = stored.bricks[std::size_t(i)];
+            brick.samples = channel.of(*brick.samples);
+        });
+        for (const ShownBrick& brick : stored.bricks)
+            for (std::size_t p = 0; p < brick.samples->count(); ++p) {
+                const auto value = double(brick.samples->values[p]);
+                if (brick.samples->coverage[p] == 0 || !std::isfinite(value)) continue;
+                range_.min = std::min(range_.min, value);
+                range_.max = std::max(range_.max, value);
+            }
+        if (range_.empty()) throw InputError(fmt::format("{} has no finite value: nothing to draw", title_));
+        // What lies beyond the layers of an extension isn't read.
+        if (file.layers == 0)
+            for (const std::string& note : stored.notes) job.say(note + "\n");
+        pool_.emplace(makePool(thread, file.tree, range_));
+        PoolTarget target(*pool_, job.execution.threads);
+        target.publish({.removed = {}, .added = stored.bricks});
+        if (target.isBehind()) target.catchUp();
+        std::vector<GrowingLeaf> leaves;
+        for (const ShownBrick& brick : stored.bricks) leaves.push_back(brick.leaf);
+        placed_ = placeBricks(target, leaves, 0, job.execution);
+        stored_ = std::move(stored.bricks);
+    }
+
+    const std::string& title() const override { return title_; }
+    const Box3d& boundsWorld() const override { return bounds_; }
+    const ValueRange& range() const override { return range_; }
+    const BrickPool& pool() const override { return *pool_; }
+    const BrickFrame& frame() const override { return frame_; }
+    std::span<const PlacedBrick> bricks() const override { return placed_; }
+
+    // Samples of coarse bricks stand for more of the volume.
+    std::vector<double> histogram(const std::array<double, 2>& range) const override {
+        ValueHistogram histogram(range);
+        for (const ShownBrick& brick : stored_) {
+            const double volume = std::ldexp(1.0, -3 * brick.leaf.key.depth.halvings());
+            for (std::size_t p = 0; p < brick.samples->count(); ++p)
+                if (brick.samples->coverage[p] != 0) histogram.add(double(brick.samples->values[p]), volume);
+        }
+        return histogram.shares();
+    }
+
+  private:
+    std::string title_;
+    Box3d bounds_;
+    BrickFrame frame_;
+    ValueRange range_;
+    std::vector<ShownBrick> stored_;
+    std::vector<PlacedBrick> placed_;
+    std::optional<BrickPool> pool_;
+};
+
+}  // namespace
+
+std::unique_ptr<PictureSource> openVdbSource(const std::string& path, const std::string& field,
+                                             std::optional<int> component, GlThread& thread, Job& job) {
+    VdbFile file = readVdb(path);
+    const ShownChannel channel(chooseField(file, field), component);
+    try {
+        return std::make_unique<VdbSource>(std::move(file), channel, thread, job);
+    } catch (const InputError& error) {
+        throw InputError(path + ": " + error.what());
+    }
+}
+
+}  // namespace tessera
