@@ -25,6 +25,10 @@ struct TransferFunction {
     friend bool operator==(const TransferFunction&, const TransferFunction&);
 };
 
+/// The stop at a value from that of one stop to that of another: linear between them.
+TransferFunction::Stop between(const TransferFunction::Stop& below, const TransferFunction::Stop& above,
+                               double value);
+
 /// What a stop looks like: red, green and blue, each multiplied by the opacity, and the opacity.
 std::array<double, 4> shownAs(const TransferFunction::Stop& stop);
 /// The same of a finite value; at a step, of what stands above it.

@@ -107,7 +107,9 @@ GlContext::GlContext(GlPlatform platform, const GlContextOptions& options)
         if (major * 10 + minor < 45)
             throw GlError("OpenGL 4.5 is needed, and the driver gives " + std::to_string(major) + "." +
                           std::to_string(minor));
-        objects_ = std::make_shared<GlObjects>(loadGlFunctions(getProcAddress));
+        GlFunctions loaded = loadGlFunctions(getProcAddress);
+        if (options.replace) options.replace(loaded);
+        objects_ = std::make_shared<GlObjects>(loaded);
         info_ = queryGlDevice(functions());
         info_.platform = platform;
         info_.platformDetail = platformContext_->detail();

@@ -17,6 +17,9 @@ class PlatformContext;
 /// How a context is made.
 struct GlContextOptions {
     bool debug = false;  ///< ask the driver for a debug context: more messages, some of them slow to find
+    /// Called once with the functions as they were loaded, before any is used but glGetIntegerv; puts others
+    /// in their place, to record calls or to make them fail.
+    void (*replace)(GlFunctions&) = nullptr;
 };
 
 /// The objects of one context that are alive. The context and its handles share it, so that a handle which is

@@ -17,6 +17,17 @@ bool operator==(const TransferFunction& a, const TransferFunction& b) {
                       });
 }
 
+TransferFunction::Stop between(const TransferFunction::Stop& below, const TransferFunction::Stop& above,
+                               double value) {
+    // In halves, as the difference of the largest numbers isn't one.
+    const double t = (value / 2 - below.value / 2) / (above.value / 2 - below.value / 2);
+    TransferFunction::Stop stop{.value = value};
+    stop.opacity = below.opacity + t * (above.opacity - below.opacity);
+    for (std::size_t c = 0; c < 3; ++c)
+        stop.color[c] = below.color[c] + t * (above.color[c] - below.color[c]);
+    return stop;
+}
+
 std::array<double, 4> shownAs(const TransferFunction::Stop& stop) {
     return {stop.color[0] * stop.opacity, stop.color[1] * stop.opacity, stop.color[2] * stop.opacity,
             stop.opacity};
@@ -28,13 +39,7 @@ std::array<double, 4> shownAt(const TransferFunction& function, double value) {
                                     [&](const TransferFunction::Stop& stop) { return stop.value > value; });
     if (above == stops.begin()) return shownAs(stops.front());
     if (above == stops.end()) return shownAs(stops.back());
-    const TransferFunction::Stop& below = *(above - 1);
-    const double t = (value - below.value) / (above->value - below.value);
-    TransferFunction::Stop between;
-    between.opacity = below.opacity + t * (above->opacity - below.opacity);
-    for (std::size_t c = 0; c < 3; ++c)
-        between.color[c] = below.color[c] + t * (above->color[c] - below.color[c]);
-    return shownAs(between);
+    return shownAs(between(*(above - 1), *above, value));
 }
 
 bool showsAny(const TransferFunction& function, double low, double high) {

@@ -23,13 +23,6 @@ double distance(const Box3d& a, const Box3d& b) {
     return glm::length(glm::max(glm::max(a.min - b.max, b.min - a.max), Vec3d(0)));
 }
 
-bool isOutside(const Box3d& box, const HalfSpace& half) {
-    const Vec3d& n = half.normalWorld;
-    const Vec3d farthest(n.x > 0 ? box.max.x : box.min.x, n.y > 0 ? box.max.y : box.min.y,
-                         n.z > 0 ? box.max.z : box.min.z);
-    return glm::dot(n, farthest) < half.offsetWorld;
-}
-
 double distanceBeyond(const Focus& focus, const Box3d& box) {
     return std::max(0.0, distance(focus.boxWorld, box) - focus.roundingWorld);
 }
@@ -40,6 +33,13 @@ bool reaches(const Focus& focus, const Box3d& box) {
 }
 
 }  // namespace
+
+bool isOutside(const Box3d& box, const HalfSpace& half) {
+    const Vec3d& n = half.normalWorld;
+    const Vec3d farthest(n.x > 0 ? box.max.x : box.min.x, n.y > 0 ? box.max.y : box.min.y,
+                         n.z > 0 ? box.max.z : box.min.z);
+    return glm::dot(n, farthest) < half.offsetWorld;
+}
 
 double wishedByFocus(std::span<const Focus> focus, double finestSpacingWorld, const Box3d& boxWorld) {
     double wished = kNoWish;

@@ -15,6 +15,9 @@ inline constexpr double kNoWish = std::numeric_limits<double>::infinity();
 /// The finest spacing that focuses wish for somewhere in a closed box, world units; kNoWish without any.
 double wishedByFocus(std::span<const Focus> focus, double finestSpacingWorld, const Box3d& boxWorld);
 
+/// Whether nothing of a closed box lies in a half-space.
+bool isOutside(const Box3d& box, const HalfSpace& half);
+
 /// Whether a place where a focus stands lies in the box.
 bool holdsFocus(std::span<const Focus> focus, const Box3d& boxWorld);
 

@@ -24,6 +24,8 @@ struct EffectScene {
 
     void set(const char* name, double value) const;
     void set(const char* name, const Vec3d& value) const;
+    /// With the length 1; a vector of the length 0 as it is.
+    void setDirection(const char* name, const Vec3d& value) const;
 };
 
 /// Something that a picture shows beside the volume itself. The shader is put together from the effects that

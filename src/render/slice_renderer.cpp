@@ -9,6 +9,7 @@
 #include "base/timer.h"
 #include "gl/gl_program.h"
 #include "refine/camera_view.h"
+#include "refine/wishes.h"
 #include "render/shaders.h"
 #include "render/visibility_order.h"
 #include "tessera/error.h"
@@ -103,12 +104,8 @@ class Scene {
         if (!needsAll_ && !showsAny(options_.function, brick.range.min - beyond, brick.range.max + beyond))
             return false;
         const Box3d box = fromEye(brick);
-        return std::none_of(seen_.begin(), seen_.end(), [&](const HalfSpace& half) {
-            const Vec3d& n = half.normalWorld;
-            const Vec3d farthest(n.x > 0 ? box.max.x : box.min.x, n.y > 0 ? box.max.y : box.min.y,
-                                 n.z > 0 ? box.max.z : box.min.z);
-            return glm::dot(n, farthest) < half.offsetWorld;
-        });
+        return std::none_of(seen_.begin(), seen_.end(),
+                            [&](const HalfSpace& half) { return isOutside(box, half); });
     }
 
     /// The bricks that are seen, the nearest first.
@@ -128,9 +125,6 @@ class Scene {
         const Box3d box = fromEye(brick);
         const Vec3i texel = pool_.layout().firstTexel(brick.slot);
         const double spacing = frame_.spacingWorld(brick.key.depth);
-        double nearest = 0;
-        for (int a = 0; a < 3; ++a)
-            nearest += std::min(view_.forward[a] * box.min[a], view_.forward[a] * box.max[a]);
         const double slab = spacing / options_.slicesAVoxel;
         DeviceBrick placed{};
         placed.low = floats(box.min);
@@ -143,7 +137,7 @@ class Scene {
         placed.isWhole = brick.isWhole;
         placed.index = {brick.key.index.x, brick.key.index.y, brick.key.index.z};
         placed.depth = brick.key.depth.halvings();
-        placed.firstSlab = float(std::floor(std::max(nearest, 0.0) / slab));
+        placed.firstSlab = float(std::floor(std::max(nearestDepth(box), 0.0) / slab));
         return placed;
     }
 
@@ -163,15 +157,6 @@ class Scene {
         for (std::size_t i = 0; i < all.size(); ++i) {
             const double value = all[i].value;
             const bool isBelow = value<low, isAbove = value> high;
-            const auto between = [&](const TransferFunction::Stop& a, const TransferFunction::Stop& b,
-                                     double at) {
-                // In halves, as the difference of the largest numbers isn't one.
-                const double t = (at / 2 - a.value / 2) / (b.value / 2 - a.value / 2);
-                TransferFunction::Stop stop;
-                stop.opacity = glm::mix(a.opacity, b.opacity, t);
-                for (std::size_t c = 0; c < 3; ++c) stop.color[c] = glm::mix(a.color[c], b.color[c], t);
-                return stop;
-            };
             if (isBelow) {
                 if (i + 1 == all.size())
                     add(all[i], low);
@@ -202,16 +187,20 @@ class Scene {
         const Box3d box = frame_.boxWorld(brick.key);
         return {box.min - eye_, box.max - eye_};
     }
+    /// Of a box relative to the eye; world units.
+    double nearestDepth(const Box3d& box) const {
+        double nearest = 0;
+        for (int a = 0; a < 3; ++a)
+            nearest += std::min(view_.forward[a] * box.min[a], view_.forward[a] * box.max[a]);
+        return nearest;
+    }
     double raySize() const {
         return 2 * view_.high / (options_.camera.heightPixels * std::sqrt(options_.samplesAPixel));
     }
     /// Of the floats that the shaders count with nothing may be lost.
     void placeEye() {
-        double nearest = 0, coarsest = 0;
-        for (int a = 0; a < 3; ++a)
-            nearest += std::min(view_.forward[a] * (box_.min[a] - eye_[a]),
-                                view_.forward[a] * (box_.max[a] - eye_[a]));
-        coarsest = frame_.rootSpacingWorld / options_.slicesAVoxel;
+        const double nearest = nearestDepth({box_.min - eye_, box_.max - eye_});
+        const double coarsest = frame_.rootSpacingWorld / options_.slicesAVoxel;
         // Parallel rays may begin anywhere, but slabs are counted from the eye.
         if (view_.isParallel && nearest > 0)
             eye_ += std::floor(nearest / coarsest) * coarsest * view_.forward;
@@ -261,6 +250,11 @@ void EffectScene::set(const char* name, double value) const {
 
 void EffectScene::set(const char* name, const Vec3d& value) const {
     gl.ProgramUniform3f(program.id(), program.uniform(name), float(value.x), float(value.y), float(value.z));
+}
+
+void EffectScene::setDirection(const char* name, const Vec3d& value) const {
+    const double length = glm::length(value);
+    set(name, length > 0 ? value / length : Vec3d(0));
 }
 
 // All that OpenGL has; only its thread looks at it.

@@ -25,7 +25,7 @@ double opacityAt(const std::vector<std::array<double, 2>>& opacities, double sha
     if (above == opacities.begin()) return opacities.front()[1];
     if (above == opacities.end()) return opacities.back()[1];
     const std::array<double, 2>& below = *(above - 1);
-    return below[1] + (share - below[0]) / ((*above)[0] - below[0]) * ((*above)[1] - below[1]);
+    return between({below[0], {}, below[1]}, {(*above)[0], {}, (*above)[1]}, share).opacity;
 }
 
 /// What most of the mesh has is clear, so that what is rare is seen in it.

@@ -5,98 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <numbers>
 #include <optional>
 #include <random>
 
-#include "brick_test_meshes.h"
-#include "gl_test_tools.h"
-#include "pictures/image.h"
-#include "reference/ray_cast.h"
+#include "pictured.h"
 #include "refine/camera_view.h"
-#include "refine/plan_frame.h"
-#include "render/effects/bricks.h"
-#include "render/effects/isosurfaces.h"
-#include "render/effects/shading.h"
 #include "render/visibility_order.h"
-#include "schedule/brick_scheduler.h"
 #include "schedule/random_schedule.h"
-#include "software/software_resampler.h"
 #include "tessera/error.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kCells = 8;
-constexpr GlPlatform kPlatform = GlPlatform::eglSurfaceless;
-
-/// A mesh whose bricks follow a focus, in a pool, and what draws them.
-class Pictured {
-  public:
-    Pictured(TetMesh made, const std::function<double(const Vec3d&)>& field, const Focus& focus,
-             SampleFormat format = SampleFormat::r32f, int resolution = 129)
-        : mesh(std::move(made)) {
-        addPointField(mesh, "other", [](const Vec3d& p) { return p.x; });
-        addPointField(mesh, "f", field);
-        ScheduleOptions options;
-        options.refine.criterion = Criterion::focus;
-        options.refine.brickCells = kCells;
-        options.refine.resolution = resolution;
-        options.refine.focus = {focus};
-        options.budgetBytes = std::int64_t(1) << 28;
-        const PlanFrame plan = chooseFrame(mesh.boundsWorld(), options.refine);
-        frame = {plan.originWorld, plan.rootSpacingWorld, kCells};
-        PoolOptions poolOptions;
-        poolOptions.budgetBytes = std::int64_t(1) << 26;
-        pool = std::make_unique<BrickPool>(thread, kCells,
-                                           TexelCoding(codingsOf(mesh, fields, format), format), poolOptions);
-        target = std::make_unique<PoolTarget>(*pool, mesh, fields, 2);
-        scheduler = std::make_unique<BrickScheduler>(mesh, fields, resampler, options, *target);
-        scheduler->finish({.threads = 2});
-        bricks = placeBricks(*target, scheduler->tree().leaves(), 1, {.threads = 2});
-    }
-
-    RgbaImage draw(const RenderOptions& options, RenderCounts* counts = nullptr) {
-        return renderer.draw(*pool, *pool->state(), frame, bricks, options, {}, counts);
-    }
-    /// What the pool was filled from, in double.
-    RayCaster caster() const {
-        const Depth finest = scheduler->tree().deepest();
-        const BrickTree tree =
-            scheduler->tree().brickTree(frame.originWorld, frame.rootSpacingWorld, kCells, finest);
-        std::vector<BrickPoints> points(tree.leafCount());
-        for (const GrowingLeaf& leaf : scheduler->tree().leaves()) {
-            const auto at = tree.findLeaf({levelOf(leaf.key.depth, finest), leaf.key.index});
-            const PointValues values =
-                target->bricks().valuesAt(leaf, target->bricks().closedPoints(leaf.key));
-            BrickPoints& brick = points[std::size_t(at)];
-            brick.covered = values.covered;
-            for (std::size_t p = 0; p < values.covered.size(); ++p)
-                brick.values.push_back(float(values.values[2 * p + 1]));
-        }
-        return {tree, std::move(points)};
-    }
-    int depths() const { return scheduler->tree().deepest().halvings() + 1; }
-
-    TetMesh mesh;
-    const std::vector<int> fields{0, 1};
-    BrickFrame frame;
-    SoftwareResampler resampler;
-    GlThread thread{kPlatform};
-    std::unique_ptr<BrickPool> pool;
-    std::unique_ptr<PoolTarget> target;
-    std::unique_ptr<BrickScheduler> scheduler;
-    SliceRenderer renderer{thread};
-    std::vector<PlacedBrick> bricks;
-};
-
-TransferFunction stops(std::vector<TransferFunction::Stop> all) {
-    return {.field = {}, .stops = std::move(all)};
-}
-TransferFunction even(double opacity) {
-    return stops({{0, {1, 0.5, 0.25}, opacity}});
-}
 /// Everything a little, with colours all along.
 TransferFunction thin() {
     return stops({{-1, {0.1, 0.1, 0.8}, 0.02}, {0, {0.2, 0.9, 0.3}, 0.1}, {1, {1, 0.3, 0.1}, 0.3}});
@@ -105,17 +26,6 @@ TransferFunction thin() {
 TransferFunction opaque() {
     return stops(
         {{0.30, {0, 0, 1}, 0}, {0.36, {1, 0.8, 0.2}, 1}, {0.42, {1, 0, 0}, 0.9}, {0.48, {1, 1, 1}, 0}});
-}
-
-Camera lookAt(const Vec3d& eye, const Vec3d& at, int pixels, double degrees = 35) {
-    return {eye, at - eye, {0, 0, 1}, degrees, pixels, pixels};
-}
-
-double wave(const Vec3d& p) {
-    return 0.6 * std::sin(3 * p.x) * std::cos(2 * p.y) + 0.4 * p.z;
-}
-double radiusOf(const Vec3d& p) {
-    return glm::length(p);
 }
 
 int pixelsAsked() {
@@ -185,13 +95,6 @@ double largestAwayFromEdges(const RgbaImage& image, const RgbaImage& reference) 
                 largest = std::max(largest, double(std::abs(image.at(x, y)[c] - reference.at(x, y)[c])));
         }
     return largest;
-}
-
-void keep(const char* name, const char* which, const RgbaImage& image) {
-    // TESSERA_KEEP_PICTURES names a folder to look at them.
-    if (const char* folder = std::getenv("TESSERA_KEEP_PICTURES"))
-        writePng(std::string(folder) + "/" + name + "_" + which + ".png",
-                 overGround(image, {0.15, 0.15, 0.2}));
 }
 
 class SliceRendererCase : public testing::TestWithParam<PictureCase> {};
@@ -452,150 +355,6 @@ TEST(SliceRenderer, ValuesThatAreNotFiniteAreNotShown) {
     const RgbaImage image = pictured.draw(options);
     EXPECT_GT(image.at(10, 16)[3], 0.9f);
     EXPECT_EQ(image.at(22, 16)[3], 0);
-}
-
-/// A cube over several depths with a linear field, seen by parallel rays.
-class Effects : public testing::Test {
-  protected:
-    static double linear(const Vec3d& p) { return glm::dot(kSlope, p); }
-    static constexpr Vec3d kSlope{0.5, 1, -0.25};
-
-    void SetUp() override {
-        TESSERA_NEEDS_GL(kPlatform);
-        pictured.emplace(gridMesh({3, 3, 3}, Vec3d(0), Vec3d(1)), linear, pointFocus({0.3, 0.4, 0.6}, 0.05));
-        ASSERT_GE(pictured->depths(), 3);
-        options.camera = lookAt({3, -2, 2.5}, Vec3d(0.5), 96);
-        options.camera.heightWorld = 1.8;
-        options.channel = 1;
-        options.function = even(0.3);
-        options.layerWorld = 0.3;
-        for (int a = 0; a < 3; ++a) {
-            Vec3d axis(0);
-            axis[a] = 1;
-            options.within.push_back({axis, 0.001});
-            options.within.push_back({-axis, -0.999});
-        }
-    }
-    Vec3d forward() const { return viewOf(options.camera).forward; }
-
-    std::optional<Pictured> pictured;
-    RenderOptions options;
-};
-
-TEST_F(Effects, ShadingOfALinearFieldIsTheSameEverywhere) {
-    const RgbaImage plain = pictured->draw(options);
-    const Shading shading{.towardsLight = {1, -1, 2}};
-    options.effects = {shadingEffect(shading)};
-    const RgbaImage shaded = pictured->draw(options);
-    const Vec3d light = glm::normalize(shading.towardsLight);
-    Vec3d normal = glm::normalize(kSlope);
-    if (glm::dot(normal, forward()) > 0) normal = -normal;
-    const double diffuse = std::max(glm::dot(normal, light), 0.0);
-    const double specular =
-        std::pow(std::max(glm::dot(normal, glm::normalize(light - forward())), 0.0), shading.shininess);
-    ValueRange range;
-    Box3d box;
-    for (const PlacedBrick& brick : pictured->bricks) {
-        range.min = std::min(range.min, brick.range.min);
-        range.max = std::max(range.max, brick.range.max);
-        box.include(pictured->frame.boxWorld(brick.key).min);
-        box.include(pictured->frame.boxWorld(brick.key).max);
-    }
-    const double steep = glm::length(kSlope), size = std::max({box.size().x, box.size().y, box.size().z});
-    const double belief = steep / (steep + range.width() / (5 * size));
-    // Of green, which is half of red.
-    const double lit = 0.5 * (shading.ambient + shading.diffuse * diffuse) + shading.specular * specular;
-    const double expected = glm::mix(0.5, lit, belief);
-    double worst = 0;
-    int seen = 0;
-    for (std::size_t p = 0; p < plain.pixels.size(); ++p) {
-        const double opacity = double(plain.pixels[p][3]);
-        ASSERT_NEAR(double(shaded.pixels[p][3]), opacity, 1e-6);
-        if (opacity < 0.05) continue;
-        ++seen;
-        worst = std::max(worst, std::abs(double(shaded.pixels[p][1]) / opacity - expected));
-    }
-    EXPECT_GT(seen, 2000);
-    EXPECT_LT(worst, 0.5 / 255) << "no step at borders between bricks, nor at the surface";
-}
-
-TEST_F(Effects, AnIsosurfaceIsWhereTheFieldHasItsValue) {
-    options.function = even(0);
-    const Isosurface surface{.value = 0.6, .color = {0.2, 0.8, 0.4}, .opacity = 0.75};
-    const Isosurface behind{.value = 0.9, .color = {1, 0, 0}, .opacity = 1};
-    options.effects = {isosurfacesEffect({behind, surface})};
-    options.camera.heightWorld = 0;
-    const RgbaImage image = pictured->draw(options);
-    const CameraView view = viewOf(options.camera);
-    int first = 0, second = 0, none = 0;
-    double worst = 0;
-    for (int y = 0; y < image.height; ++y)
-        for (int x = 0; x < image.width; ++x) {
-            const ViewRay ray = view.rayOf(options.camera, x, y);
-            const auto meets = [&](double value, double margin) {
-                const double at = (value - linear(ray.originWorld)) / glm::dot(kSlope, ray.direction);
-                const Vec3d p = ray.originWorld + at * ray.direction;
-                return glm::all(glm::greaterThan(p, Vec3d(margin))) &&
-                       glm::all(glm::lessThan(p, Vec3d(1 - margin)));
-            };
-            double opacity = 0;
-            const bool isSure =
-                meets(0.6, 0.02) == meets(0.6, -0.02) && meets(0.9, 0.02) == meets(0.9, -0.02);
-            if (!isSure) continue;
-            if (meets(0.6, 0)) opacity = 0.75, ++first;
-            if (meets(0.9, 0)) opacity = 1, ++second;
-            none += opacity == 0;
-            worst = std::max(worst, std::abs(opacity - double(image.at(x, y)[3])));
-            if (!meets(0.6, 0) || meets(0.9, 0)) continue;
-            // Lit from the camera.
-            const double facing = std::abs(glm::dot(glm::normalize(kSlope), ray.direction));
-            const double green = 0.8 * (0.3 + 0.65 * facing) + 0.25 * std::pow(facing, 40.0);
-            worst = std::max(worst, std::abs(0.75 * green - double(image.at(x, y)[1])));
-        }
-    EXPECT_LT(worst, 1.0 / 255);
-    EXPECT_GT(first, 100);
-    EXPECT_GT(second, 100);
-    EXPECT_GT(none, 100);
-}
-
-TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
-    options.within.clear();
-    options.function = even(0);
-    options.effects = {brickEdgesEffect({.widthPixels = 3, .opacity = 1})};
-    options.camera.widthPixels = options.camera.heightPixels = 256;
-    RenderCounts counts;
-    const RgbaImage image = pictured->draw(options, &counts);
-    EXPECT_EQ(counts.unseenBricks, 0);
-    const CameraView view = viewOf(options.camera);
-    int on = 0;
-    for (const PlacedBrick& brick : pictured->bricks) {
-        const Box3d box = pictured->frame.boxWorld(brick.key);
-        for (int i = 1; i < 8; ++i) {
-            const Vec3d p = glm::mix(box.min, Vec3d(box.max.x, box.min.y, box.min.z), i / 8.0);
-            const Vec3d at = p - options.camera.eyeWorld;
-            const int x = int(128 * (1 + glm::dot(at, view.right) / view.wide));
-            const int y = int(128 * (1 - glm::dot(at, view.up) / view.high));
-            if (x < 1 || y < 1 || x > 254 || y > 254) continue;
-            ++on;
-            // Half of an outermost edge's line is beside the bricks.
-            float most = 0;
-            for (int n = 0; n < 9; ++n) most = std::max(most, image.at(x + n % 3 - 1, y + n / 3 - 1)[3]);
-            EXPECT_GT(most, 0.9f) << x << " " << y;
-        }
-    }
-    EXPECT_GT(on, 500);
-    const auto clear = std::ranges::count_if(image.pixels, [](const Rgba& pixel) { return pixel[3] == 0; });
-    EXPECT_GT(clear, 256 * 256 / 5);
-}
-
-TEST_F(Effects, OneThatIsntNamedChangesNothing) {
-    const RgbaImage before = pictured->draw(options);
-    options.effects = {shadingEffect({}), brickEdgesEffect({})};
-    EXPECT_NE(pictured->draw(options).pixels, before.pixels);
-    options.effects.clear();
-    EXPECT_EQ(pictured->draw(options).pixels, before.pixels);
-    EXPECT_THROW(isosurfacesEffect({}), InputError);
-    EXPECT_THROW(isosurfacesEffect(std::vector<Isosurface>(17)), InputError);
 }
 
 TEST(SliceRenderer, RefusesOptionsOutOfRange) {

@@ -38,8 +38,7 @@ Effect isosurfacesEffect(std::vector<Isosurface> surfaces, const Vec3d& towardsL
         scene.gl.ProgramUniform4fv(program, scene.program.uniform("isosurfaces"), count, shown[0].data());
         scene.gl.ProgramUniform1fv(program, scene.program.uniform("isosurfaceCodes"), count, codes.data());
         scene.gl.ProgramUniform1i(program, scene.program.uniform("isosurfaceCount"), count);
-        const double length = glm::length(towardsLight);
-        scene.set("isosurfaceLight", length > 0 ? towardsLight / length : Vec3d(0));
+        scene.setDirection("isosurfaceLight", towardsLight);
     };
     return effect;
 }

@@ -19,8 +19,7 @@ Effect shadingEffect(const Shading& shading) {
     effect.shade = "shadingShade";
     effect.readsIndex = true;
     effect.setUniforms = [shading](const EffectScene& scene) {
-        const double length = glm::length(shading.towardsLight);
-        scene.set("shadingLight", length > 0 ? shading.towardsLight / length : Vec3d(0));
+        scene.setDirection("shadingLight", shading.towardsLight);
         scene.gl.ProgramUniform4f(scene.program.id(), scene.program.uniform("shadingWeights"),
                                   float(shading.ambient), float(shading.diffuse), float(shading.specular),
                                   float(shading.shininess));

@@ -1,0 +1,242 @@
+#include "render/effect.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "brick_test_meshes.h"
+#include "gl_calls.h"
+#include "pictured.h"
+#include "refine/camera_view.h"
+#include "render/effects/bricks.h"
+#include "render/effects/isosurfaces.h"
+#include "render/effects/shading.h"
+#include "tessera/error.h"
+
+namespace tessera {
+namespace {
+
+/// A cube over several depths with a linear field, seen by parallel rays.
+class Effects : public testing::Test {
+  protected:
+    static double linear(const Vec3d& p) { return glm::dot(kSlope, p); }
+    static constexpr Vec3d kSlope{0.5, 1, -0.25};
+
+    void SetUp() override {
+        TESSERA_NEEDS_GL(kPlatform);
+        pictured.emplace(gridMesh({3, 3, 3}, Vec3d(0), Vec3d(1)), linear, pointFocus({0.3, 0.4, 0.6}, 0.05));
+        ASSERT_GE(pictured->depths(), 3);
+        options.camera = lookAt({3, -2, 2.5}, Vec3d(0.5), 96);
+        options.camera.heightWorld = 1.8;
+        options.channel = 1;
+        options.function = even(0.3);
+        options.layerWorld = 0.3;
+        for (int a = 0; a < 3; ++a) {
+            Vec3d axis(0);
+            axis[a] = 1;
+            options.within.push_back({axis, 0.001});
+            options.within.push_back({-axis, -0.999});
+        }
+    }
+    Vec3d forward() const { return viewOf(options.camera).forward; }
+
+    std::optional<Pictured> pictured;
+    RenderOptions options;
+};
+
+TEST_F(Effects, ShadingOfALinearFieldIsTheSameEverywhere) {
+    const RgbaImage plain = pictured->draw(options);
+    const Shading shading{.towardsLight = {1, -1, 2}};
+    options.effects = {shadingEffect(shading)};
+    const RgbaImage shaded = pictured->draw(options);
+    const Vec3d light = glm::normalize(shading.towardsLight);
+    Vec3d normal = glm::normalize(kSlope);
+    if (glm::dot(normal, forward()) > 0) normal = -normal;
+    const double diffuse = std::max(glm::dot(normal, light), 0.0);
+    const double specular =
+        std::pow(std::max(glm::dot(normal, glm::normalize(light - forward())), 0.0), shading.shininess);
+    ValueRange range;
+    Box3d box;
+    for (const PlacedBrick& brick : pictured->bricks) {
+        range.min = std::min(range.min, brick.range.min);
+        range.max = std::max(range.max, brick.range.max);
+        box.include(pictured->frame.boxWorld(brick.key).min);
+        box.include(pictured->frame.boxWorld(brick.key).max);
+    }
+    const double steep = glm::length(kSlope), size = std::max({box.size().x, box.size().y, box.size().z});
+    const double belief = steep / (steep + range.width() / (5 * size));
+    // Of green, which is half of red.
+    const double lit = 0.5 * (shading.ambient + shading.diffuse * diffuse) + shading.specular * specular;
+    const double expected = glm::mix(0.5, lit, belief);
+    double worst = 0;
+    int seen = 0;
+    for (std::size_t p = 0; p < plain.pixels.size(); ++p) {
+        const double opacity = double(plain.pixels[p][3]);
+        ASSERT_NEAR(double(shaded.pixels[p][3]), opacity, 1e-6);
+        if (opacity < 0.05) continue;
+        ++seen;
+        worst = std::max(worst, std::abs(double(shaded.pixels[p][1]) / opacity - expected));
+    }
+    EXPECT_GT(seen, 2000);
+    EXPECT_LT(worst, 0.5 / 255) << "no step at borders between bricks, nor at the surface";
+}
+
+TEST_F(Effects, AnIsosurfaceIsWhereTheFieldHasItsValue) {
+    options.function = even(0);
+    const Isosurface surface{.value = 0.6, .color = {0.2, 0.8, 0.4}, .opacity = 0.75};
+    const Isosurface behind{.value = 0.9, .color = {1, 0, 0}, .opacity = 1};
+    options.effects = {isosurfacesEffect({behind, surface})};
+    options.camera.heightWorld = 0;
+    const RgbaImage image = pictured->draw(options);
+    const CameraView view = viewOf(options.camera);
+    int first = 0, second = 0, none = 0;
+    double worst = 0;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const ViewRay ray = view.rayOf(options.camera, x, y);
+            const auto meets = [&](double value, double margin) {
+                const double at = (value - linear(ray.originWorld)) / glm::dot(kSlope, ray.direction);
+                const Vec3d p = ray.originWorld + at * ray.direction;
+                return glm::all(glm::greaterThan(p, Vec3d(margin))) &&
+                       glm::all(glm::lessThan(p, Vec3d(1 - margin)));
+            };
+            double opacity = 0;
+            const bool isSure =
+                meets(0.6, 0.02) == meets(0.6, -0.02) && meets(0.9, 0.02) == meets(0.9, -0.02);
+            if (!isSure) continue;
+            if (meets(0.6, 0)) opacity = 0.75, ++first;
+            if (meets(0.9, 0)) opacity = 1, ++second;
+            none += opacity == 0;
+            worst = std::max(worst, std::abs(opacity - double(image.at(x, y)[3])));
+            if (!meets(0.6, 0) || meets(0.9, 0)) continue;
+            // Lit from the camera.
+            const double facing = std::abs(glm::dot(glm::normalize(kSlope), ray.direction));
+            const double green = 0.8 * (0.3 + 0.65 * facing) + 0.25 * std::pow(facing, 40.0);
+            worst = std::max(worst, std::abs(0.75 * green - double(image.at(x, y)[1])));
+        }
+    EXPECT_LT(worst, 1.0 / 255);
+    EXPECT_GT(first, 100);
+    EXPECT_GT(second, 100);
+    EXPECT_GT(none, 100);
+}
+
+TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
+    options.within.clear();
+    options.function = even(0);
+    options.effects = {brickEdgesEffect({.widthPixels = 3, .opacity = 1})};
+    options.camera.widthPixels = options.camera.heightPixels = 256;
+    RenderCounts counts;
+    const RgbaImage image = pictured->draw(options, &counts);
+    EXPECT_EQ(counts.unseenBricks, 0);
+    const CameraView view = viewOf(options.camera);
+    int on = 0;
+    for (const PlacedBrick& brick : pictured->bricks) {
+        const Box3d box = pictured->frame.boxWorld(brick.key);
+        for (int i = 1; i < 8; ++i) {
+            const Vec3d p = glm::mix(box.min, Vec3d(box.max.x, box.min.y, box.min.z), i / 8.0);
+            const Vec3d at = p - options.camera.eyeWorld;
+            const int x = int(128 * (1 + glm::dot(at, view.right) / view.wide));
+            const int y = int(128 * (1 - glm::dot(at, view.up) / view.high));
+            if (x < 1 || y < 1 || x > 254 || y > 254) continue;
+            ++on;
+            // Half of an outermost edge's line is beside the bricks.
+            float most = 0;
+            for (int n = 0; n < 9; ++n) most = std::max(most, image.at(x + n % 3 - 1, y + n / 3 - 1)[3]);
+            EXPECT_GT(most, 0.9f) << x << " " << y;
+        }
+    }
+    EXPECT_GT(on, 500);
+    const auto clear = std::ranges::count_if(image.pixels, [](const Rgba& pixel) { return pixel[3] == 0; });
+    EXPECT_GT(clear, 256 * 256 / 5);
+}
+
+/// One of each.
+std::vector<Effect> everyEffect() {
+    return {brickEdgesEffect({}), isosurfacesEffect({{.value = 0.6}}), shadingEffect({})};
+}
+
+/// All that OpenGL is asked for, while pictures are drawn.
+class EffectCalls : public testing::Test {
+  protected:
+    void SetUp() override {
+        TESSERA_NEEDS_GL(kPlatform);
+        pictured.emplace(ballMesh(3, 1), wave, pointFocus({0.4, -0.3, 0.2}, 0.2), SampleFormat::r32f, 33,
+                         GlContextOptions{.replace = recordGlCalls});
+        state = pictured->pool->state();
+        options.camera = lookAt({3, -2, 2.5}, Vec3d(0), 24);
+        options.channel = 1;
+        options.function = even(0.3);
+    }
+    GlCalls drawnBy(SliceRenderer& renderer, const std::vector<Effect>& effects) {
+        options.effects = effects;
+        GlCalls::take();
+        renderer.draw(*pictured->pool, *state, pictured->frame, pictured->bricks, options, {});
+        return GlCalls::take();
+    }
+
+    std::optional<Pictured> pictured;
+    std::shared_ptr<const PoolState> state;
+    RenderOptions options;
+};
+
+TEST_F(EffectCalls, AnEffectThatIsntNamedLeavesNoTextNoObjectAndNoCall) {
+    SliceRenderer plain(pictured->thread);
+    const GlCalls first = drawnBy(plain, {}), again = drawnBy(plain, {});
+    EXPECT_EQ(first.texts.size(), 4u) << "two programs";
+    EXPECT_TRUE(again.texts.empty());
+    EXPECT_EQ(first.countOf("CreateTextures"), 2) << "colour and depth";
+    EXPECT_EQ(first.countOf("CreateBuffers"), 2) << "bricks and stops";
+    EXPECT_EQ(again.countOf("CreateTextures"), 0);
+    EXPECT_GT(again.countOf("DrawArraysInstanced"), 0);
+    for (const Effect& effect : everyEffect()) {
+        SCOPED_TRACE(effect.name);
+        for (const std::string& text : first.texts)
+            for (const ShaderText& own : effect.texts) EXPECT_EQ(text.find(own.text), std::string::npos);
+        std::vector<Effect> effects = everyEffect();
+        std::erase_if(effects, [&](const Effect& other) { return other.name != effect.name; });
+        SliceRenderer renderer(pictured->thread);
+        EXPECT_NE(drawnBy(renderer, effects).texts, first.texts);
+        effects.clear();
+        const GlCalls erased = drawnBy(renderer, effects);
+        ASSERT_EQ(erased.texts.size(), 2u);
+        for (const std::string& text : erased.texts)
+            EXPECT_NE(std::ranges::find(first.texts, text), first.texts.end());
+        EXPECT_EQ(drawnBy(renderer, effects).calls, again.calls);
+    }
+    SliceRenderer other(pictured->thread);
+    EXPECT_EQ(drawnBy(other, {}).calls, first.calls) << "after all of them";
+}
+
+TEST_F(EffectCalls, AShaderHasTheTextsOfItsEffectsAlone) {
+    const std::vector<Effect> all = everyEffect();
+    for (const Effect& effect : all) {
+        SliceRenderer renderer(pictured->thread);
+        const GlCalls calls = drawnBy(renderer, {effect});
+        const auto holds = [&](const ShaderText& text) {
+            return std::ranges::any_of(calls.texts, [&](const std::string& shader) {
+                return shader.find(text.text) != std::string::npos;
+            });
+        };
+        for (const Effect& other : all)
+            for (const ShaderText& text : other.texts) {
+                const bool isOwn =
+                    std::ranges::find(effect.texts, text.name, &ShaderText::name) != effect.texts.end();
+                EXPECT_EQ(holds(text), isOwn) << effect.name << ", " << text.name;
+            }
+    }
+}
+
+TEST_F(Effects, OneThatIsntNamedChangesNothing) {
+    const RgbaImage before = pictured->draw(options);
+    options.effects = {shadingEffect({}), brickEdgesEffect({})};
+    EXPECT_NE(pictured->draw(options).pixels, before.pixels);
+    options.effects.clear();
+    EXPECT_EQ(pictured->draw(options).pixels, before.pixels);
+    EXPECT_THROW(isosurfacesEffect({}), InputError);
+    EXPECT_THROW(isosurfacesEffect(std::vector<Isosurface>(17)), InputError);
+}
+
+}  // namespace
+}  // namespace tessera
