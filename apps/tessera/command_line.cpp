@@ -372,7 +372,7 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
 }
 
 void addRenderOptions(CLI::App& command, RenderArguments& a) {
-    command.add_option("vdb", a.request.input, "a .vdb file that tessera wrote")->required();
+    command.add_option("input", a.request.input, "a .vdb file that tessera wrote, or a mesh")->required();
     command
         .add_option("-o,--output", a.request.output,
                     "the picture: .png, or .exr with light and opacity as floats; - for a .png to standard "
@@ -398,7 +398,7 @@ void addRenderOptions(CLI::App& command, RenderArguments& a) {
                      "tell what each effect costs, and how much of the picture it changes");
     command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
         ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
-    addCommonOptions(command, a.common, false);
+    addCommonOptions(command, a.common);
     command.footer(
         "Examples:\n  tessera render flow.vdb -o flow.png\n"
         "  tessera render flow.vdb --scene scene.json -o flow.png --size 1920x1080 --samples 9");
@@ -641,7 +641,8 @@ void describe(CLI::App& app, CommandLine& line) {
     addCommand(app, line, "tets", "write the tetrahedra that a mesh is split into", addTetsOptions, runTets);
     addCommand(app, line, "picture", "draw one slice of a .vdb file as a .png", addPictureOptions,
                runPicture);
-    addCommand(app, line, "render", "draw a .vdb file's volume: a .png or .exr", addRenderOptions, runRender);
+    addCommand(app, line, "render", "draw the volume of a .vdb file or a mesh: a .png or .exr",
+               addRenderOptions, runRender);
     addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
                addCompareOptions, runCompare);
     addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",

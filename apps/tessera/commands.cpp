@@ -76,6 +76,7 @@ int runPicture(const PictureArguments& a) {
 
 int runRender(const RenderArguments& a) {
     RenderRequest request = a.request;
+    if (isVdbName(request.input)) refuseReaderBounds(a.common.reader, request.input + " is no mesh");
     if (!a.size.empty()) request.size = parsePictureSize("--size", a.size);
     if (!a.gl.empty()) request.platform = parseGlPlatform(a.gl);
     Session session(a.common, request.output);

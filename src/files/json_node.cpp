@@ -56,6 +56,11 @@ JsonNode JsonNode::read(const std::string& path, const std::string& what) {
     return node;
 }
 
+JsonNode JsonNode::of(nlohmann::json json, const std::string& name) {
+    const auto root = std::make_shared<const nlohmann::json>(std::move(json));
+    return {std::make_shared<const std::string>(name), root, *root, ""};
+}
+
 void JsonNode::expectKeys(std::initializer_list<std::string_view> known) const {
     if (!json_->is_object()) fail("an object");
     for (const auto& [key, value] : json_->items()) {

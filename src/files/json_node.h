@@ -19,6 +19,9 @@ class JsonNode {
     /// A whole file. @param what it is, such as "the scene".
     static JsonNode read(const std::string& path, const std::string& what);
 
+    /// What a program has made. @param name in place of a file's.
+    static JsonNode of(nlohmann::json json, const std::string& name);
+
     /// An object that has no other keys than these.
     void expectKeys(std::initializer_list<std::string_view> known) const;
     /// Of an object: null where there is no such key.

@@ -1,6 +1,10 @@
 #include "job/picture_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -15,6 +19,14 @@ std::vector<double> ValueHistogram::shares() const {
     std::vector<double> shares = shares_;
     for (double& share : shares) share = all_ > 0 ? share / all_ : 0;
     return shares;
+}
+
+std::string titleOf(const OutputField& field, std::optional<int> component) {
+    if (component && *component >= field.components)
+        throw InputError(fmt::format("{} has {} components, counted from 0; there is no component {}",
+                                     field.name, field.components, *component));
+    if (field.components == 1) return field.name;
+    return component ? fmt::format("{} {}", field.name, *component) : fmt::format("|{}|", field.name);
 }
 
 }  // namespace tessera

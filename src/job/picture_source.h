@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "pool/brick_pool.h"
 #include "render/placed_bricks.h"
 #include "tessera/vec.h"
+#include "vdb/vdb_file.h"
 
 namespace tessera {
 
@@ -30,6 +32,10 @@ class ValueHistogram {
     std::vector<double> shares_;
     double all_ = 0;
 };
+
+/// Of one component of a field, counted from 0, or of a vector without one of its length: "T", "v 2", "|v|".
+/// Throws InputError for a component that there isn't.
+std::string titleOf(const OutputField& field, std::optional<int> component);
 
 /// What pictures are drawn of: the bricks of one field in a pool of an OpenGL device.
 class PictureSource {

@@ -7,6 +7,9 @@
 #include <utility>
 
 #include "files/atomic_file.h"
+#include "job/describe_files.h"
+#include "job/import_mesh.h"
+#include "job/mesh_source.h"
 #include "job/output_paths.h"
 #include "job/scene_picture.h"
 #include "job/table_text.h"
@@ -88,10 +91,31 @@ std::string explanation(const RenderedPicture& picture, std::size_t width) {
                        picture.counts.draws);
 }
 
+/// Bricks of a mesh come to rest first.
+std::unique_ptr<PictureSource> openSource(const RenderRequest& request, const Scene& scene, GlThread& thread,
+                                          Job& job) {
+    if (isVdbName(request.input))
+        return openVdbSource(request.input, scene.field, scene.component, thread, job);
+    const MeshFile file = openMesh(request.input, {}, job);
+    std::unique_ptr<MeshSource> source;
+    try {
+        source = std::make_unique<MeshSource>(file.mesh, scene, 0, thread, job.execution);
+    } catch (const InputError& error) {
+        throw InputError(request.input + ": " + error.what());
+    }
+    source->setFocus(scene);
+    source->live().scheduler().finish(job.execution);
+    source->live().update(BrickScheduler::Clock::now(), job.execution);
+    if (source->live().scheduler().isCutShort())
+        job.fellShort(fmt::format("a budget of {:.3g} MB holds fewer bricks than the focus asks for",
+                                  1e-6 * double(scene.bricks.budgetBytes)));
+    return source;
+}
+
 RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job& job) {
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
-    const auto source = openVdbSource(request.input, scene.field, scene.component, thread, job);
+    const std::unique_ptr<PictureSource> source = openSource(request, scene, thread, job);
     const ScenePicture asked = pictureOf(scene, *source, !isExr);
     if (asked.lacksLegend)
         job.warn(

@@ -13,7 +13,8 @@
 
 namespace tessera {
 
-/// What `tessera render` is asked for: a picture of a .vdb file's bricks. What is given here counts instead
+/// What `tessera render` is asked for: a picture of the bricks of a .vdb file, or of a
+/// mesh, made around the scene's focus. What is given here counts instead
 /// of what the scene says.
 struct RenderRequest {
     std::string input, output;  ///< output: a .png or .exr file; "-": a .png to standard output

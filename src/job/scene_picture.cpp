@@ -55,6 +55,7 @@ ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isO
     options.within = scene.within;
     options.samplesAPixel = scene.samplesAPixel;
     options.effects = scene.effects;
+    options.values = source.range();
     return picture;
 }
 

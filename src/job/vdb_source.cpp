@@ -21,9 +21,6 @@ namespace {
 class ShownChannel {
   public:
     ShownChannel(const OutputField& field, std::optional<int> component) : field_(field) {
-        if (component && *component >= field.components)
-            throw InputError(fmt::format("{} has {} components, counted from 0; there is no component {}",
-                                         field.name, field.components, *component));
         if (component || field.components == 1) only_ = field.firstChannel + component.value_or(0);
     }
 
@@ -39,11 +36,6 @@ class ShownChannel {
         for (std::size_t p = 0; p < points; ++p) shown->values[p] = valueAt(block, p);
         return shown;
     }
-    std::string title() const {
-        if (field_.components == 1) return field_.name;
-        if (only_ < 0) return fmt::format("|{}|", field_.name);
-        return fmt::format("{} {}", field_.name, only_ - field_.firstChannel);
-    }
 
   private:
     float valueAt(const Block& block, std::size_t point) const {
@@ -57,7 +49,7 @@ class ShownChannel {
         return float(std::sqrt(square));
     }
 
-    OutputField field_;
+    const OutputField& field_;
     int only_ = -1;
 };
 
@@ -73,13 +65,15 @@ BrickPool makePool(GlThread& thread, const BrickTree& tree, const ValueRange& ra
 
 class VdbSource : public PictureSource {
   public:
-    VdbSource(VdbFile file, const ShownChannel& channel, GlThread& thread, Job& job)
-        : title_(channel.title()),
+    VdbSource(VdbFile file, const OutputField& field, std::optional<int> component, GlThread& thread,
+              Job& job)
+        : title_(titleOf(field, component)),
           bounds_(coveredBounds(file)),
           frame_{file.tree.originWorld(),
                  file.tree.spacingWorld(levelOf(Depth(0), Depth(file.tree.levelCount() - 1))),
                  file.tree.brickCells()} {
         if (bounds_.empty()) throw InputError("no voxel lies in the mesh: nothing to draw");
+        const ShownChannel channel(field, component);
         StoredBricks stored =
             showStored(file.tree, file.store, {file.layers, file.halfFloat, true}, job.execution);
         file.store = BrickStore();
@@ -102,9 +96,7 @@ class VdbSource : public PictureSource {
         PoolTarget target(*pool_, job.execution.threads);
         target.publish({.removed = {}, .added = stored.bricks});
         if (target.isBehind()) target.catchUp();
-        std::vector<GrowingLeaf> leaves;
-        for (const ShownBrick& brick : stored.bricks) leaves.push_back(brick.leaf);
-        placed_ = placeBricks(target, leaves, 0, job.execution);
+        placed_ = placeBricks(target, 0);
         stored_ = std::move(stored.bricks);
     }
 
@@ -141,9 +133,10 @@ class VdbSource : public PictureSource {
 std::unique_ptr<PictureSource> openVdbSource(const std::string& path, const std::string& field,
                                              std::optional<int> component, GlThread& thread, Job& job) {
     VdbFile file = readVdb(path);
-    const ShownChannel channel(chooseField(file, field), component);
+    const OutputField shown = chooseField(file, field);
+    titleOf(shown, component);
     try {
-        return std::make_unique<VdbSource>(std::move(file), channel, thread, job);
+        return std::make_unique<VdbSource>(std::move(file), shown, component, thread, job);
     } catch (const InputError& error) {
         throw InputError(path + ": " + error.what());
     }

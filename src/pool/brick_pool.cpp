@@ -1,6 +1,7 @@
 #include "pool/brick_pool.h"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -41,6 +42,7 @@ struct BrickPool::Device {
     GlThread* thread = nullptr;
     GlContext* context = nullptr;
     std::vector<GlTexture> codes, coverage;  // atlas by atlas, group by group
+    int layers = 0;                          // of slots along z, those of the last atlas
     std::vector<std::unique_ptr<IndexCopy>> copies;
     IndexCopy* shown = nullptr;
     std::vector<std::uint32_t> freeSlots;
@@ -137,18 +139,49 @@ BrickPool::BrickPool(GlThread& thread, int brickCells, TexelCoding coding, const
             thread.run([d](GlContext&) { delete d; });
     });
     device_->thread = &thread;
+    const std::int64_t slotTexels = std::int64_t(layout_.edge) * layout_.edge * layout_.edge;
+    const std::int64_t layerBytes = slotTexels * layout_.slots.x * layout_.slots.y * coding_.pointBytes();
+    const std::int64_t all = std::int64_t(layout_.slots.z) * layout_.atlases;
+    const std::int64_t first =
+        options.firstBytes > 0 ? std::clamp<std::int64_t>(options.firstBytes / layerBytes, 1, all) : all;
     thread.run([&](GlContext& context) {
         device_->context = &context;
-        const Vec3i texels = layout_.texels();
-        for (int atlas = 0; atlas < layout_.atlases; ++atlas)
-            for (std::size_t group = 0; group < coding_.groupCount(); ++group) {
-                device_->codes.emplace_back(context, GL_TEXTURE_3D, coding_.internalFormat(group), texels.x,
-                                            texels.y, texels.z);
-                device_->coverage.emplace_back(context, GL_TEXTURE_3D, GL_R8, texels.x, texels.y, texels.z);
-            }
+        for (std::int64_t left = first; left > 0; left -= layout_.slots.z)
+            grow(context, int(std::min<std::int64_t>(left, layout_.slots.z)));
     });
+}
+
+/// Makes the last atlas so many layers deep, or where it is that deep a new one.
+void BrickPool::grow(GlContext& context, int layers) const {
+    const std::size_t groups = coding_.groupCount();
+    const bool isNew = device_->codes.empty() || device_->layers == layout_.slots.z;
+    const int before = isNew ? 0 : device_->layers;
+    const Vec3i texels = layout_.texels(), kept(texels.x, texels.y, before * layout_.edge);
+    std::vector<GlTexture> codes, coverage;
+    const auto make = [&](std::vector<GlTexture>& to, GLenum format, const GlTexture* from) {
+        to.emplace_back(context, GL_TEXTURE_3D, format, texels.x, texels.y, layers * layout_.edge);
+        if (from)
+            context.functions().CopyImageSubData(from->id(), GL_TEXTURE_3D, 0, 0, 0, 0, to.back().id(),
+                                                 GL_TEXTURE_3D, 0, 0, 0, 0, kept.x, kept.y, kept.z);
+    };
+    const std::size_t first = isNew ? device_->codes.size() : device_->codes.size() - groups;
+    for (std::size_t group = 0; group < groups; ++group) {
+        make(codes, coding_.internalFormat(group), isNew ? nullptr : &device_->codes[first + group]);
+        make(coverage, GL_R8, isNew ? nullptr : &device_->coverage[first + group]);
+    }
+    context.throwIfFailed();
+    device_->codes.resize(first);
+    device_->coverage.resize(first);
+    std::move(codes.begin(), codes.end(), std::back_inserter(device_->codes));
+    std::move(coverage.begin(), coverage.end(), std::back_inserter(device_->coverage));
+    device_->layers = layers;
     // The lowest are taken first.
-    for (std::size_t slot = capacity(); slot-- > 0;) device_->freeSlots.push_back(std::uint32_t(slot));
+    const std::uint32_t atlas = std::uint32_t(first / groups) * layout_.slotsAnAtlas();
+    const auto layer = std::uint32_t(layout_.slots.x * layout_.slots.y);
+    std::vector<std::uint32_t> slots;
+    for (std::uint32_t slot = std::uint32_t(layers) * layer; slot-- > std::uint32_t(before) * layer;)
+        slots.push_back(atlas + slot);
+    device_->freeSlots.insert(device_->freeSlots.begin(), slots.begin(), slots.end());
 }
 
 GlThread& BrickPool::thread() const {
@@ -156,9 +189,19 @@ GlThread& BrickPool::thread() const {
 }
 
 std::int64_t BrickPool::deviceBytes() const {
-    const Vec3i texels = layout_.texels();
-    const std::int64_t points = std::int64_t(texels.x) * texels.y * texels.z * layout_.atlases;
-    return points * coding_.pointBytes() + thread().run([&](GlContext&) { return device_->indexBytes(); });
+    return thread().run([&](GlContext&) {
+        const std::int64_t slotTexels = std::int64_t(layout_.edge) * layout_.edge * layout_.edge;
+        return std::int64_t(madeSlots()) * slotTexels * coding_.pointBytes() + device_->indexBytes();
+    });
+}
+
+int BrickPool::atlases() const {
+    return int(device_->codes.size() / coding_.groupCount());
+}
+
+std::size_t BrickPool::madeSlots() const {
+    const auto layer = std::size_t(layout_.slots.x * layout_.slots.y);
+    return std::size_t(atlases() - 1) * layout_.slotsAnAtlas() + std::size_t(device_->layers) * layer;
 }
 
 const GlTexture& BrickPool::codes(int atlas, std::size_t group) const {
@@ -199,14 +242,19 @@ ShaderText brickIndexShader() {
 std::size_t BrickPool::freeSlots() {
     return thread().run([&](GlContext&) {
         device_->freeRetired();
-        return device_->freeSlots.size();
+        return device_->freeSlots.size() + capacity() - madeSlots();
     });
 }
 
 std::optional<std::vector<std::uint32_t>> BrickPool::takeSlots(std::size_t count) {
-    return thread().run([&](GlContext&) -> std::optional<std::vector<std::uint32_t>> {
+    return thread().run([&](GlContext& context) -> std::optional<std::vector<std::uint32_t>> {
         std::vector<std::uint32_t>& free = device_->freeSlots;
         if (free.size() < count) device_->freeRetired();
+        // By half, so that copying what there is stays cheap for each slot.
+        while (free.size() < count && madeSlots() < capacity()) {
+            const int layers = device_->layers % layout_.slots.z;
+            grow(context, std::min(layout_.slots.z, layers + std::max(1, layers / 2)));
+        }
         while (free.size() < count && device_->waitForOne()) device_->freeRetired();
         if (free.size() < count) return std::nullopt;
         std::vector<std::uint32_t> slots(free.rbegin(), free.rbegin() + std::ptrdiff_t(count));

@@ -21,6 +21,9 @@ struct PoolOptions {
     /// Of all slots. The index comes on top: 50 bytes at most for every brick that is split, in three copies
     /// and one for each further state that is held.
     std::int64_t budgetBytes = std::int64_t(1) << 30;
+    /// Of the slots made at first, one layer of a texture's at least; textures grow as slots are taken. 0:
+    /// all are made at once.
+    std::int64_t firstBytes = 0;
     /// Texels along an edge are bounded by the device too.
     AtlasLimits limits;
 };
@@ -55,11 +58,13 @@ struct SlotUpload {
 /// them and shows them; slots that were shown before come back when no state holds them and the device has
 /// done what was asked of it until then. Texels are those of TexelCoding; places those of SlotLayout.
 ///
+/// A texture that grows is another one, with what the one before had: look it up when it is used.
+///
 /// Its functions may be called on any thread: they are tasks of the OpenGL thread, where they run at once.
 class BrickPool {
   public:
-    /// Takes the device's memory. The thread must outlive the pool. Throws InputError for a budget that holds
-    /// no brick, GlError when the device has no room.
+    /// Takes the device's memory, or that of the first slots. The thread must outlive the pool. Throws
+    /// InputError for a budget that holds no brick, GlError when the device has no room.
     BrickPool(GlThread& thread, int brickCells, TexelCoding coding, const PoolOptions& options = {});
 
     GlThread& thread() const;
@@ -67,8 +72,10 @@ class BrickPool {
     const TexelCoding& coding() const { return coding_; }
     const SlotLayout& layout() const { return layout_; }
     std::size_t capacity() const { return layout_.capacity(); }
-    /// Of textures and buffers.
+    /// Of textures and buffers as they are now.
     std::int64_t deviceBytes() const;
+    /// Made so far. To be used on the OpenGL thread.
+    int atlases() const;
     /// Textures of a group in an atlas; not filtered unless a sampler says so. To be used on the OpenGL
     /// thread.
     const GlTexture& codes(int atlas, std::size_t group) const;
@@ -95,6 +102,8 @@ class BrickPool {
 
   private:
     struct Device;
+    void grow(GlContext& context, int layers) const;
+    std::size_t madeSlots() const;
     void copySlot(const GlFunctions& gl, std::uint32_t from, std::uint32_t to) const;
     void uploadPart(const GlFunctions& gl, std::uint32_t slot, const SlotUpload::Part& part) const;
 

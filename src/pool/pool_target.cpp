@@ -1,6 +1,7 @@
 #include "pool/pool_target.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -36,14 +37,23 @@ PoolTarget::PoolTarget(BrickPool& pool, const TetMesh& mesh, std::span<const int
 PoolTarget::PoolTarget(BrickPool& pool, int threads)
     : pool_(pool), execution_{.threads = threads}, bricks_(pool.coding().channels(), pool.brickCells()) {}
 
-PoolTarget::InPool& PoolTarget::inPool(std::uint32_t number) {
+std::optional<BrickInPool>& PoolTarget::inPool(std::uint32_t number) {
     if (number >= inPool_.size()) inPool_.resize(std::size_t(number) + 1);
     return inPool_[number];
 }
 
 std::optional<std::uint32_t> PoolTarget::slotOf(const GrowingLeaf& leaf) const {
-    if (leaf.slot >= inPool_.size() || inPool_[leaf.slot].key != leaf.key) return std::nullopt;
-    return inPool_[leaf.slot].slot;
+    if (leaf.slot >= inPool_.size() || !inPool_[leaf.slot] || inPool_[leaf.slot]->key != leaf.key)
+        return std::nullopt;
+    return inPool_[leaf.slot]->slot;
+}
+
+std::vector<const BrickInPool*> PoolTarget::shown() const {
+    std::vector<const BrickInPool*> shown;
+    for (const std::optional<BrickInPool>& brick : inPool_)
+        if (brick) shown.push_back(&*brick);
+    for (const BrickInPool& brick : gone_) shown.push_back(&brick);
+    return shown;
 }
 
 std::vector<PoolTarget::Touched> PoolTarget::touchedBy(const Publication& publication) const {
@@ -85,8 +95,8 @@ void PoolTarget::publish(const Publication& publication) {
     isBehind_ = true;
     for (const GrowingLeaf& leaf : publication.removed) {
         stale_.erase(leaf.slot);
-        InPool& shown = inPool(leaf.slot);
-        if (shown.key) gone_.push_back(std::exchange(shown, {}));
+        std::optional<BrickInPool>& shown = inPool(leaf.slot);
+        if (shown) gone_.push_back(std::move(*std::exchange(shown, std::nullopt)));
     }
     for (const ShownBrick& brick : publication.added) note(brick.leaf, bricks_.closedPoints(brick.leaf.key));
     const std::vector<PointValues> after = valuesOf(touched);
@@ -95,20 +105,44 @@ void PoolTarget::publish(const Publication& publication) {
     if (isTooSmall() || !catchUp()) ++counts_.postponed;
 }
 
+// Takes the points into what is known of a brick.
+void PoolTarget::look(const PointValues& points, BrickInPool& at) const {
+    at.channels.resize(std::size_t(bricks_.channels()));
+    for (std::size_t p = 0; p < points.covered.size(); ++p) {
+        const bool isCovered = points.covered[p] != 0;
+        at.isCovered = at.isCovered || isCovered;
+        at.isWhole = at.isWhole && isCovered;
+        for (std::size_t c = 0; c < at.channels.size(); ++c) {
+            const double value = points.values[p * at.channels.size() + c];
+            BrickInPool::Channel& channel = at.channels[c];
+            if (!std::isfinite(value)) {
+                channel.isFinite = false;
+                continue;
+            }
+            channel.range.min = std::min(channel.range.min, value);
+            channel.range.max = std::max(channel.range.max, value);
+        }
+    }
+}
+
 std::vector<PoolTarget::Work> PoolTarget::codeStale() const {
     std::vector<Work> work;
     std::vector<const Stale*> stale;
     for (const auto& [number, one] : stale_) {
-        work.push_back({one.leaf, {}});
+        const bool isNew = !slotOf(one.leaf);
+        work.push_back(
+            {one.leaf, {}, isNew ? BrickInPool{one.leaf.key, 0, false, true, {}} : *inPool_[number]});
         stale.push_back(&one);
     }
     parallelFor(execution_, std::int64_t(work.size()), [&](std::int64_t i) {
         const Stale& from = *stale[std::size_t(i)];
         const Vec3i first = bricks_.closedPoints(from.leaf.key).min;
-        for (const IndexBox& part : from.parts)
+        for (const IndexBox& part : from.parts) {
+            const PointValues values = bricks_.valuesAt(from.leaf, part);
             work[std::size_t(i)].upload.parts.push_back(
-                {{part.min - first, part.max - first},
-                 pool_.coding().encode(bricks_.valuesAt(from.leaf, part))});
+                {{part.min - first, part.max - first}, pool_.coding().encode(values)});
+            look(values, work[std::size_t(i)].shown);
+        }
     });
     return work;
 }
@@ -132,8 +166,8 @@ bool PoolTarget::findSlots(std::vector<Work>& work) {
     if (isInPlace) {
         // Without a frame that reads them slots may be written where they stand.
         if (pool_.isHeld()) return false;
-        for (const InPool& gone : gone_) {
-            index_.remove(*gone.key);
+        for (const BrickInPool& gone : gone_) {
+            index_.remove(gone.key);
             pool_.giveBack({&gone.slot, 1});
         }
         gone_.clear();
@@ -165,8 +199,8 @@ bool PoolTarget::show(std::vector<Work>& work) {
         pool_.giveBack(unused);
         throw;
     }
-    for (const InPool& gone : gone_) {
-        index_.remove(*gone.key);
+    for (const BrickInPool& gone : gone_) {
+        index_.remove(gone.key);
         retired_.push_back(gone.slot);
     }
     gone_.clear();
@@ -179,7 +213,8 @@ bool PoolTarget::show(std::vector<Work>& work) {
         const auto before = slotOf(leaf);
         if (before && *before != slot) retired_.push_back(*before);
         if (before != slot) index_.put(leaf.key, slot);
-        inPool(leaf.slot) = {leaf.key, slot};
+        work[i].shown.slot = slot;
+        inPool(leaf.slot) = std::move(work[i].shown);
         ++(before ? counts_.changed : counts_.uploaded);
         for (const SlotUpload::Part& part : uploads[i].parts)
             counts_.uploadBytes += part.box.count() * pool_.coding().pointBytes();

@@ -22,6 +22,21 @@ struct PoolCounts {
     std::int64_t postponed = 0;    ///< publications that the pool had no room for at once
 };
 
+/// What a pool shows of a brick.
+struct BrickInPool {
+    DepthKey key;
+    std::uint32_t slot = 0;
+    bool isCovered = false;  ///< some point of the closed box may be
+    bool isWhole = false;    ///< every point is
+    /// Of a channel: the finite values of all points of the closed box, those outside the mesh too, lie
+    /// within.
+    struct Channel {
+        ValueRange range;
+        bool isFinite = true;  ///< every value is
+    };
+    std::vector<Channel> channels;
+};
+
 /// Fills a pool with the bricks that a scheduler shows, border values by the seam rule. The pool goes from
 /// one whole state to the next, as the scheduler does, but may be behind it: where states that frames hold
 /// leave no room for the next one it is shown by a later publication, or by catchUp().
@@ -55,14 +70,11 @@ class PoolTarget : public BrickTarget {
     const ShownBricks& bricks() const { return bricks_; }
     /// The slot of a leaf in the state that the pool shows.
     std::optional<std::uint32_t> slotOf(const GrowingLeaf& leaf) const;
+    /// The bricks of the state that the pool shows, in no order that means anything.
+    std::vector<const BrickInPool*> shown() const;
     const PoolCounts& counts() const { return counts_; }
 
   private:
-    /// What the pool shows of the leaf with a number.
-    struct InPool {
-        std::optional<DepthKey> key;
-        std::uint32_t slot = 0;
-    };
     /// A leaf with points that the pool doesn't show yet, or of another value.
     struct Stale {
         GrowingLeaf leaf;
@@ -71,6 +83,7 @@ class PoolTarget : public BrickTarget {
     struct Work {
         GrowingLeaf leaf;
         SlotUpload upload;
+        BrickInPool shown;  // of the parts uploaded
     };
     /// Points of a leaf that stays whose values may change.
     struct Touched {
@@ -82,7 +95,8 @@ class PoolTarget : public BrickTarget {
     std::vector<Touched> touchedBy(const Publication& publication) const;
     std::vector<PointValues> valuesOf(const std::vector<Touched>& touched) const;
     void note(const GrowingLeaf& leaf, const IndexBox& part);
-    InPool& inPool(std::uint32_t number);
+    std::optional<BrickInPool>& inPool(std::uint32_t number);
+    void look(const PointValues& points, BrickInPool& at) const;
     std::vector<Work> codeStale() const;
     bool show(std::vector<Work>& work);
     bool findSlots(std::vector<Work>& work);
@@ -91,11 +105,11 @@ class PoolTarget : public BrickTarget {
     Execution execution_;
     std::optional<NearestOnDemand> nearest_;
     ShownBricks bricks_;
-    BrickIndex index_;  // numbers are slots
-    std::vector<InPool> inPool_;
-    std::map<std::uint32_t, Stale> stale_;  // by number of the leaf
-    std::vector<InPool> gone_;              // what it shows and isn't published any more
-    std::vector<std::uint32_t> retired_;    // slots that the index left, but not yet what is shown
+    BrickIndex index_;                                // numbers are slots
+    std::vector<std::optional<BrickInPool>> inPool_;  // by number of the leaf
+    std::map<std::uint32_t, Stale> stale_;            // by number of the leaf
+    std::vector<BrickInPool> gone_;                   // what it shows and isn't published any more
+    std::vector<std::uint32_t> retired_;              // slots that the index left, but not yet what is shown
     bool isBehind_ = false;
     PoolCounts counts_;
 };

@@ -1,14 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "brick/brick_tree.h"
-#include "brick/growing_tree.h"
 #include "mesh/field_range.h"
 #include "pool/pool_target.h"
-#include "tessera/execution.h"
 #include "tessera/vec.h"
 
 namespace tessera {
@@ -28,15 +25,14 @@ struct BrickFrame {
 struct PlacedBrick {
     DepthKey key;
     std::uint32_t slot = 0;
-    /// Of the finite values of all points of the closed box, those outside the mesh too: what is interpolated
-    /// lies within.
+    /// The finite values of all points of the closed box lie within, those outside the mesh too, and so does
+    /// what is interpolated.
     ValueRange range;
-    bool isCovered = false;  ///< some point is
+    bool isCovered = false;  ///< some point may be
     bool isWhole = false;    ///< every point is, with a finite value
 };
 
-/// What a target's pool shows. @param leaves those that were published last; the target isn't behind.
-std::vector<PlacedBrick> placeBricks(const PoolTarget& target, std::span<const GrowingLeaf> leaves,
-                                     int channel, const Execution& execution);
+/// What a target's pool shows.
+std::vector<PlacedBrick> placeBricks(const PoolTarget& target, int channel);
 
 }  // namespace tessera

@@ -65,14 +65,15 @@ class Scene {
           frame_(frame),
           options_(options),
           view_(viewOf(options.camera)),
-          eye_(options.camera.eyeWorld) {
+          eye_(options.camera.eyeWorld),
+          range_(options.values) {
         needsAll_ = std::any_of(options.effects.begin(), options.effects.end(),
                                 [](const Effect& effect) { return effect.needsAllBricks; });
         for (const PlacedBrick& brick : bricks) {
             const Box3d box = frame.boxWorld(brick.key);
             box_.include(box.min);
             box_.include(box.max);
-            if (brick.range.empty()) continue;
+            if (brick.range.empty() || !options.values.empty()) continue;
             range_.min = std::min(range_.min, brick.range.min);
             range_.max = std::max(range_.max, brick.range.max);
         }

@@ -28,6 +28,8 @@ struct RenderOptions {
     std::vector<HalfSpace> within;
     /// Rays a pixel, in a square: 1, 4, 9 or 16.
     int samplesAPixel = 1;
+    /// Of the values of all that may be shown, whichever bricks are there; empty: of the bricks given.
+    ValueRange values;
     /// In the order in which they shade.
     std::vector<Effect> effects;
 };

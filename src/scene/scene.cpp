@@ -14,6 +14,8 @@ namespace {
 
 /// Of the picture's width or height, around what is shown.
 constexpr double kMargin = 0.06;
+/// Of the longest side, the usual radius of a focus.
+constexpr double kFocusSizes = 16;
 /// Stops along a map; between them values are linear, so a logarithmic scale needs many.
 constexpr int kSteps = 64, kLogarithmicSteps = 512;
 /// Of the rarest values, and of the most frequent ones, which show where the mesh is.
@@ -100,6 +102,24 @@ Camera cameraOf(const Scene& scene, const Box3d& boundsWorld, int legendPixels) 
     lookAlong(target - *from.eyeWorld);
     viewOf(camera);
     return camera;
+}
+
+std::vector<Focus> focusOf(const SceneBricks& bricks, const Box3d& boundsWorld, const Camera& camera,
+                           double finestSpacingWorld) {
+    const Vec3d size = boundsWorld.size();
+    const double usualRadius = std::max({size.x, size.y, size.z}) / kFocusSizes;
+    std::vector<Focus> focus;
+    for (const SceneFocus& at : bricks.focus)
+        focus.push_back(pointFocus(at.placeWorld, at.radiusWorld.value_or(usualRadius)));
+    if (bricks.pixelsAVoxel > 0) {
+        Camera coarser = camera;
+        const double pixels = bricks.pixelsAVoxel;
+        coarser.widthPixels = std::max(1, int(std::lround(camera.widthPixels / pixels)));
+        coarser.heightPixels = std::max(1, int(std::lround(camera.heightPixels / pixels)));
+        focus.push_back(cameraFocus(coarser, finestSpacingWorld));
+    }
+    if (focus.empty()) focus.push_back(pointFocus(0.5 * (boundsWorld.min + boundsWorld.max), usualRadius));
+    return focus;
 }
 
 std::array<double, 2> shownRangeOf(const SceneFunction& function, const ValueRange& range) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -35,12 +36,30 @@ struct SceneCamera {
     bool isParallel = false;  ///< without an eye
 };
 
+/// A place around which a mesh's bricks are fine.
+struct SceneFocus {
+    Vec3d placeWorld{0};
+    std::optional<double> radiusWorld;  ///< Focus::radiusWorld; none: a sixteenth of the longest side
+};
+
+/// How a mesh becomes bricks; a file has its own.
+struct SceneBricks {
+    int resolution = 512;  ///< lattice points of the finest spacing along the longest side
+    int cells = 16;        ///< along a brick's edge: 8, 16, 32 or 64
+    std::int64_t budgetBytes = 1'000'000'000;  ///< of samples in memory
+    /// None, and no view: around the middle.
+    std::vector<SceneFocus> focus;
+    /// Above 0: as fine as the picture shows, so many pixels a voxel; beside the places.
+    double pixelsAVoxel = 0;
+};
+
 /// What a picture shows. Every default is such that a scene without a word makes a picture.
 struct Scene {
     std::string field;             ///< empty: the first
     std::optional<int> component;  ///< of a vector, counted from 0; none: its length
     SceneCamera camera;
     SceneFunction function;
+    SceneBricks bricks;
     /// A layer as thick as this has the opacities of the function; none: a twentieth of the longest side.
     std::optional<double> layerWorld;
     std::array<double, 3> ground{1, 1, 1};  ///< red, green, blue from 0 to 1
@@ -57,6 +76,10 @@ struct Scene {
 /// legend takes on the right: a camera without an eye leaves them free. Throws InputError for one that
 /// sees nothing.
 Camera cameraOf(const Scene& scene, const Box3d& boundsWorld, int legendPixels);
+
+/// Where bricks are to be fine. @param camera cameraOf(scene). @param finestSpacingWorld of the bricks.
+std::vector<Focus> focusOf(const SceneBricks& bricks, const Box3d& boundsWorld, const Camera& camera,
+                           double finestSpacingWorld);
 
 /// @param range of the field's values. @param histogram shares of the samples in bins of one width over it:
 /// what the opacities come from where the scene has none. Throws InputError for a logarithmic scale over

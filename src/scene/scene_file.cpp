@@ -61,6 +61,26 @@ SceneCamera readCamera(const JsonNode& json) {
     return camera;
 }
 
+SceneBricks readBricks(const JsonNode& json) {
+    json.expectKeys({"resolution", "cells", "budget", "focus", "view"});
+    SceneBricks bricks;
+    if (const auto resolution = json.find("resolution")) bricks.resolution = resolution->whole(2, 1 << 20);
+    if (const auto cells = json.find("cells")) {
+        bricks.cells = cells->whole(8, 64);
+        if (bricks.cells & (bricks.cells - 1)) cells->fail("8, 16, 32 or 64");
+    }
+    if (const auto budget = json.find("budget")) bricks.budgetBytes = std::int64_t(budget->number(1, 1e15));
+    if (const auto focus = json.find("focus"))
+        for (const JsonNode& at : focus->list("a list of places")) {
+            at.expectKeys({"place", "radius"});
+            SceneFocus& one = bricks.focus.emplace_back();
+            one.placeWorld = at.at("place").vector();
+            if (const auto radius = at.find("radius")) one.radiusWorld = radius->length();
+        }
+    if (const auto view = json.find("view")) bricks.pixelsAVoxel = view->number(0.25, 1000);
+    return bricks;
+}
+
 SceneFunction readFunction(const JsonNode& json) {
     json.expectKeys({"map", "range", "log", "opacity", "stops"});
     SceneFunction function;
@@ -196,9 +216,13 @@ std::vector<TransferFunction::Stop> readStops(const JsonNode& json) {
 }
 
 Scene readScene(const std::string& path) {
-    const JsonNode json = JsonNode::read(path, "the scene");
+    return sceneFrom(JsonNode::read(path, "the scene"));
+}
+
+Scene sceneFrom(const JsonNode& json) {
     json.expectKeys({"$schema", "version", "field", "component", "camera", "transfer_function", "layer",
-                     "background", "clip", "size", "samples", "slices", "legend", "unit", "effects"});
+                     "background", "bricks", "clip", "size", "samples", "slices", "legend", "unit",
+                     "effects"});
     if (json.at("version").number() != kVersion) json.at("version").fail("1, the version of this format");
     Scene scene;
     if (const auto field = json.find("field")) scene.field = field->text();
@@ -207,6 +231,7 @@ Scene readScene(const std::string& path) {
     if (const auto function = json.find("transfer_function")) scene.function = readFunction(*function);
     if (const auto layer = json.find("layer")) scene.layerWorld = layer->length();
     if (const auto background = json.find("background")) scene.ground = readColour(*background);
+    if (const auto bricks = json.find("bricks")) scene.bricks = readBricks(*bricks);
     if (const auto clip = json.find("clip")) readClip(*clip, scene.within);
     if (const auto size = json.find("size")) {
         const auto edges = size->list("width and height in pixels");

@@ -1135,6 +1135,24 @@ class Pictures(AppTest):
         self.assertEqual(set(border), {(255, 255, 255)})
         self.assertNotEqual(rows[160][200], (255, 255, 255))
 
+    def test_a_mesh_is_drawn_in_bricks_around_the_scenes_focus(self):
+        def render(**bricks):
+            scene = self.scene(bricks={"resolution": 65, "cells": 8, **bricks}, effects={"bricks": {}}, legend=False)
+            report = self.report("render", self.cube, "-o", "out.png", "--scene", scene, "--size", "90x70", "--samples", "1")
+            return report["bricks"]["total"], self.pixels()
+
+        middle, shown = render()
+        self.assertEqual(render(), (middle, shown))
+        self.assertEqual(render(focus=[{"place": [0.5, 0.5, 0.5], "radius": 1 / 16}]), (middle, shown))
+        corner, other = render(focus=[{"place": [1, 1, 1]}])
+        self.assertNotEqual(shown, other)
+        both, _ = render(focus=[{"place": [1, 1, 1]}, {"place": [0, 0, 0]}])
+        self.assertLess(corner, both)
+        self.assertLess(render(view=30)[0], render(view=0.5)[0])
+        # What is there of a field doesn't change with the bricks.
+        scene = self.scene(bricks={"resolution": 33}, legend=False)
+        self.assertEqual(self.report("render", self.cube, "-o", "out.png", "--scene", scene, "--size", "40x40")["value_range"], [0, 1])
+
     def test_a_scene_is_drawn_as_it_says(self):
         # From before y = 0, as high as three cubes: red left of the middle, blue right of it.
         stops = [{"value": v, "color": c, "opacity": 1} for v, c in ((0.5, [1, 0, 0]), (0.5, [0, 0, 1]))]
@@ -1195,7 +1213,12 @@ class Pictures(AppTest):
     def test_bad_input_is_one_line(self):
         out = ("-o", "out.png")
         self.reject(2, "missing.vdb", "render", "missing.vdb", *out)
-        self.reject(2, "cube.vtu", "render", self.cube, *out)
+        self.reject(2, "nowhere.vtu", "render", "nowhere.vtu", *out)
+        self.reject(2, "cube.vtu none f", "render", self.cube, *out, "--field", "none")
+        self.reject(2, "cube.vtu budget", "render", self.cube, *out, "--scene", self.scene(bricks={"budget": 1000}))
+        self.reject(2, "scene.json bricks.cells 16", "render", self.cube, *out, "--scene", self.scene(bricks={"cells": 12}))
+        self.reject(2, "scene.json bricks.focus", "render", self.cube, *out, "--scene", self.scene(bricks={"focus": [{}]}))
+        self.reject(2, "--max-memory cube.vdb", "render", self.vdb, *out, "--max-memory", "1G")
         self.reject(2, "none f", "render", self.vdb, *out, "--field", "none")
         self.reject(2, "component 3", "render", self.vdb, *out, "--component", "3")
         self.reject(2, "png exr", "render", self.vdb, "-o", "out.jpg")
@@ -1234,6 +1257,9 @@ class Pictures(AppTest):
             (True, {"camera": {"direction": [1, 1, 1], "parallel": True}, "layer": 0.1, "background": [0, 0, 0], "legend": False, "unit": "m"}),
             (True, {"transfer_function": {"stops": [{"value": 0, "opacity": 1}]}, "clip": {"box": [0, 0, 0, 1, 1, 0.5], "planes": []}}),
             (True, {"clip": {"planes": [{"normal": [1, 0, 0], "offset": 0.2}]}, "field": "f"}),
+            (True, {"bricks": {"resolution": 64, "cells": 8, "budget": 5e8, "focus": [{"place": [0, 0, 0], "radius": 1}], "view": 3}}),
+            (False, {"bricks": {"focus": [{"radius": 1}]}}),
+            (False, {"bricks": {"cells": 12}}),
             (True, {"effects": {"shading": {"light": [1, 1, 1], "shininess": 10}, "bricks": {"width": 2}}}),
             (True, {"effects": {"isosurfaces": {"surfaces": [{"value": 0.5, "color": [1, 0, 0], "opacity": 0.5}]}}}),
             (False, {"effects": {"glow": {}}}),

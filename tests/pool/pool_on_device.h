@@ -26,7 +26,7 @@ class PoolOnDevice {
             const TexelCoding& coding = pool.coding();
             const Vec3i size = pool.layout().texels();
             const auto texels = std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z);
-            for (int atlas = 0; atlas < pool.layout().atlases; ++atlas)
+            for (int atlas = 0; atlas < pool.atlases(); ++atlas)
                 for (std::size_t group = 0; group < coding.groupCount(); ++group) {
                     auto& codes = codes_.emplace_back(texels * std::size_t(coding.texelBytes(group)));
                     auto& coverage = coverage_.emplace_back(texels);

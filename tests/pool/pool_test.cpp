@@ -49,6 +49,7 @@ struct Setting {
     std::vector<int> fields{0, kLinear, 2};
     int threads = 1;
     bool hasBounds = false;
+    bool poolGrows = false;
 };
 
 /// A scheduler that fills a pool, on an OpenGL thread of its own.
@@ -75,6 +76,7 @@ class Bench {
         PoolOptions poolOptions;
         poolOptions.budgetBytes = setting.poolBricks * 9 * 9 * 9 * coding.pointBytes();
         poolOptions.limits.texels = setting.atlasTexels;
+        poolOptions.firstBytes = setting.poolGrows ? 1 : 0;
         pool = std::make_unique<BrickPool>(thread, kCells, coding, poolOptions);
         target = std::make_unique<PoolTarget>(*pool, mesh, fields, setting.threads);
         scheduler = std::make_unique<BrickScheduler>(mesh, fields, *resampler, options, *target);
@@ -298,7 +300,9 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     if (setting.format == SampleFormat::r16f) setting.fields = {kLinear};
     if (setting.format == SampleFormat::r16) setting.fields = {0, 2, kLinear, 2, 0, 2};
     if (setting.format == SampleFormat::r8) setting.atlasTexels = 40, setting.hasBounds = true;
+    setting.poolGrows = setting.format != SampleFormat::r32f;
     Bench bench(setting);
+    const std::int64_t firstBytes = bench.pool->deviceBytes();
     EXPECT_EQ(bench.pool->layout().atlases > 3, setting.format == SampleFormat::r8);
     std::mt19937 random(unsigned(setting.format) + 7);
     // TESSERA_POOL_UPDATES asks for more.
@@ -324,6 +328,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     EXPECT_GT(acrossDepths, 50);
     EXPECT_GT(bench.target->counts().changed, 0);
     EXPECT_EQ(bench.target->counts().postponed, 0);
+    EXPECT_EQ(bench.pool->deviceBytes() > 2 * firstBytes, setting.poolGrows);
     bench.scheduler.reset();
     bench.target.reset();
     EXPECT_GT(bench.liveObjects(), 0);

@@ -44,7 +44,7 @@ class Pictured {
         target = std::make_unique<PoolTarget>(*pool, mesh, fields, 2);
         scheduler = std::make_unique<BrickScheduler>(mesh, fields, resampler, options, *target);
         scheduler->finish({.threads = 2});
-        bricks = placeBricks(*target, scheduler->tree().leaves(), 1, {.threads = 2});
+        bricks = placeBricks(*target, 1);
     }
 
     RgbaImage draw(const RenderOptions& options, RenderCounts* counts = nullptr) {

@@ -1,0 +1,82 @@
+#include "job/mesh_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.h"
+#include "job/field_selection.h"
+#include "mesh/geometry.h"
+#include "refine/plan_frame.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
+
+namespace tessera {
+
+namespace {
+
+/// A field's component, or a vector's length.
+Field scalarOf(const Field& field, std::optional<int> component, const Execution& execution) {
+    if (field.components == 1) return field;
+    Field scalar{field.name, field.location, 1,
+                 std::vector<double>(field.values.size() / std::size_t(field.components))};
+    parallelFor(execution.withoutProgress(), std::int64_t(scalar.values.size()), [&](std::int64_t item) {
+        double square = 0;
+        for (int c = 0; c < field.components; ++c) square += field.at(item, c) * field.at(item, c);
+        scalar.values[std::size_t(item)] = component ? field.at(item, *component) : std::sqrt(square);
+    });
+    return scalar;
+}
+
+}  // namespace
+
+MeshSource::MeshSource(const TetMesh& mesh, const Scene& scene, int threads, GlThread& thread,
+                       const Execution& execution)
+    : mesh_{mesh.points, mesh.tets, {}} {
+    std::vector<FieldChoice> choices;
+    if (!scene.field.empty()) choices.push_back({scene.field, scene.field});
+    const FieldSelection selection = selectFields(mesh, choices);
+    if (selection.fields.empty()) throw InputError("the mesh has no field");
+    const OutputField& output = selection.outputs[0];
+    title_ = titleOf(output, scene.component);
+    mesh_.fields.push_back(
+        scalarOf(mesh.fields[std::size_t(selection.fields[0])], scene.component, execution));
+    range_ = finiteFloatRange(mesh_.fields[0], 0);
+    if (range_.empty()) throw InputError(fmt::format("{} has no finite value: nothing to draw", title_));
+    ScheduleOptions options;
+    options.refine.criterion = Criterion::focus;
+    options.refine.resolution = scene.bricks.resolution;
+    options.refine.brickCells = scene.bricks.cells;
+    options.budgetBytes = scene.bricks.budgetBytes;
+    options.threads = threads;
+    live_ = std::make_unique<LiveBricks>(mesh_, 0, findResampler("software"), options, SampleFormat::r32f,
+                                         thread, execution);
+    bounds_ = meshBounds(mesh_, execution);
+}
+
+bool MeshSource::setFocus(const Scene& scene) {
+    const PlanFrame& frame = live_->scheduler().frame();
+    return live_->scheduler().setFocus(
+        focusOf(scene.bricks, bounds_, cameraOf(scene, bounds_, 0), frame.spacingWorld(frame.maxDepth)));
+}
+
+// The mean of an element's values stands for its volume.
+std::vector<double> MeshSource::histogram(const std::array<double, 2>& range) const {
+    ValueHistogram histogram(range);
+    const Field& field = mesh_.fields[0];
+    for (std::size_t e = 0; e < mesh_.tets.size(); ++e) {
+        double value = 0;
+        if (field.location == FieldLocation::cell)
+            value = field.values[e];
+        else
+            for (const std::int32_t node : mesh_.tets[e]) value += 0.25 * field.values[std::size_t(node)];
+        const auto& tet = mesh_.tets[e];
+        const auto corner = [&](std::size_t c) { return mesh_.points[std::size_t(tet[c])]; };
+        histogram.add(value, std::abs(sixfoldVolume(corner(0), corner(1), corner(2), corner(3)).value));
+    }
+    return histogram.shares();
+}
+
+}  // namespace tessera
