@@ -67,7 +67,7 @@ void JsonNode::expectKeys(std::initializer_list<std::string_view> known) const {
         if (std::find(known.begin(), known.end(), key) != known.end()) continue;
         std::string all;
         for (const std::string_view name : known) all += (all.empty() ? "" : ", ") + std::string(name);
-        refuse("unknown key \"" + key + "\"; it knows " + all);
+        refuse("unknown key \"" + key + "\"; it knows " + (all.empty() ? "none" : all));
     }
 }
 

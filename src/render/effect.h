@@ -8,6 +8,7 @@
 #include "gl/gl_handles.h"
 #include "gl/shader_text.h"
 #include "mesh/field_range.h"
+#include "tessera/transfer_function.h"
 #include "tessera/vec.h"
 
 namespace tessera {
@@ -19,8 +20,10 @@ struct EffectScene {
     const ValueCoding& coding;  ///< of the channel shown
     ValueRange range;           ///< of that channel in all bricks
     double sizeWorld = 0;       ///< the longest side of the bricks' box
-    /// Of a ray: its opening in radians, or with parallel rays its width in world units.
-    double raySize = 0;
+    /// Of a pixel: its opening in radians, or with parallel rays its width in world units.
+    double pixelSize = 0;
+    Vec3d eyeWorld{0};  ///< places in shaders are relative to it
+    const TransferFunction& function;
 
     void set(const char* name, double value) const;
     void set(const char* name, const Vec3d& value) const;
@@ -32,7 +35,8 @@ struct EffectScene {
 /// a picture names, so one that it doesn't name leaves no text there, no uniform and no buffer.
 ///
 /// An effect is a file of GLSL and one of C++ in render/effects. The GLSL has functions for some of the
-/// places named here; shaders/brick_fragment.glsl calls them.
+/// places named here; shaders/brick_fragment.glsl calls them. `local` is a place in the brick, in voxels;
+/// `origin` and `direction`, of length 1, are those of the ray, relative to the eye in world units.
 struct Effect {
     std::string name;               ///< as scenes write it
     std::vector<ShaderText> texts;  ///< in the order needed; one that effects share stands in the shader once
@@ -44,9 +48,21 @@ struct Effect {
     std::string sheet;
     /// vec4 f(vec3 local): what is on a face of the brick, where the ray comes in or goes out.
     std::string face;
+    /// vec4 f(float codeBegin, float codeEnd, float layers, out float share): colour and opacity of a slab so
+    /// thick, by the codes at its ends, in place of those of the code in its middle; and where in the slab
+    /// that is seen, from 0 to 1. One effect's at most.
+    std::string classify;
+    /// float f(vec3 origin, vec3 direction, float after): how far along the ray, beyond `after`, the effect's
+    /// next surface is; a lot when there is none. Slabs end there. For a ray the same numbers in every call
+    /// and every brick, so that a surface is drawn once: `precise`.
+    std::string surfaceDistance;
+    /// vec4 f(vec3 local, vec3 origin, vec3 direction, float at): what is on that surface, as `sheet`.
+    std::string surface;
+    /// bool f(vec3 origin, vec3 direction, float at): whether nothing of the volume is shown there.
+    std::string hide;
     bool needsAllBricks = false;  ///< those too of which the transfer function shows nothing
     bool readsIndex = false;      ///< needs the pool's index of bricks
-    std::function<void(const EffectScene&)> setUniforms;
+    std::function<void(const EffectScene&)> setUniforms;  ///< none: it has none
 };
 
 }  // namespace tessera

@@ -180,7 +180,9 @@ class Scene {
                 pool_.coding().codings()[std::size_t(options_.channel)],
                 range_,
                 std::max({size.x, size.y, size.z}),
-                raySize()};
+                pixelSize(),
+                eye_,
+                options_.function};
     }
 
   private:
@@ -195,9 +197,8 @@ class Scene {
             nearest += std::min(view_.forward[a] * box.min[a], view_.forward[a] * box.max[a]);
         return nearest;
     }
-    double raySize() const {
-        return 2 * view_.high / (options_.camera.heightPixels * std::sqrt(options_.samplesAPixel));
-    }
+    double pixelSize() const { return 2 * view_.high / options_.camera.heightPixels; }
+    double raySize() const { return pixelSize() / std::sqrt(options_.samplesAPixel); }
     /// Of the floats that the shaders count with nothing may be lost.
     void placeEye() {
         const double nearest = nearestDepth({box_.min - eye_, box_.max - eye_});
@@ -237,6 +238,8 @@ void checkOptions(const BrickPool& pool, const RenderOptions& options) {
     if (rays != 1 && rays != 4 && rays != 9 && rays != 16)
         throw InputError("a pixel has 1, 4, 9 or 16 rays, not " + std::to_string(rays));
     if (options.within.size() > kMostClips) throw InputError("a picture has 32 clip planes at most");
+    if (std::ranges::count_if(options.effects, [](const Effect& one) { return !one.classify.empty(); }) > 1)
+        throw InputError("one effect at most says what a slab looks like");
     for (const HalfSpace& half : options.within)
         if (const double length = glm::length(half.normalWorld);
             !isLength(length) || !std::isfinite(half.offsetWorld))
@@ -278,23 +281,58 @@ struct SliceRenderer::Device {
 /// Text of a function that calls those of all effects; none, and no define, where no effect has one.
 struct Hook {
     const char* define;
-    const char* begin;  // of the function
-    const char* call;   // of one of them, behind its name
-    const char* end;
     std::string Effect::*function;
-    bool addsUp;
+    const char* head;    // of the function
+    const char* first;   // what stands before the calls,
+    const char* before;  // before the name of each,
+    const char* behind;  // behind it,
+    const char* last;    // and behind them all
 };
 
+constexpr const char* kSum = "    vec4 sum = vec4(0);\n";
+constexpr const char* kAdd = "    sum += (1.0 - sum.a) * ";
+constexpr const char* kReturnSum = "    return sum;\n";
+
 constexpr Hook kHooks[] = {
-    {"SHADE", "void shadeByEffects(inout vec4 shown, vec3 local, vec3 direction) {\n",
-     "(shown, local, direction);\n", "}\n", &Effect::shade, false},
-    {"SHEET",
-     "vec4 sheetByEffects(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction) {\n"
-     "    vec4 sum = vec4(0);\n",
-     "(codeBegin, codeEnd, begin, end, direction);\n", "    return sum;\n}\n", &Effect::sheet, true},
-    {"FACE", "vec4 faceByEffects(vec3 local) {\n    vec4 sum = vec4(0);\n", "(local);\n",
-     "    return sum;\n}\n", &Effect::face, true},
+    {"SHADE", &Effect::shade, "void shadeByEffects(inout vec4 shown, vec3 local, vec3 direction)", "", "    ",
+     "(shown, local, direction);\n", ""},
+    {"SHEET", &Effect::sheet,
+     "vec4 sheetByEffects(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction)", kSum, kAdd,
+     "(codeBegin, codeEnd, begin, end, direction);\n", kReturnSum},
+    {"FACE", &Effect::face, "vec4 faceByEffects(vec3 local)", kSum, kAdd, "(local);\n", kReturnSum},
+    {"CLASSIFY", &Effect::classify,
+     "vec4 classifyByEffects(float codeBegin, float codeEnd, float layers, out float share)", "",
+     "    return ", "(codeBegin, codeEnd, layers, share);\n", ""},
+    {"SURFACE", &Effect::surfaceDistance, "float surfaceBehind(vec3 origin, vec3 direction, float after)",
+     "    float next = 1e38;\n", "    next = min(next, ", "(origin, direction, after));\n",
+     "    return next;\n"},
+    {"SURFACE", &Effect::surface, "vec4 surfaceByEffects(vec3 local, vec3 origin, vec3 direction, float at)",
+     kSum, kAdd, "(local, origin, direction, at);\n", kReturnSum},
+    {"HIDE", &Effect::hide, "bool isHiddenByEffects(vec3 origin, vec3 direction, float at)", "", "    if (",
+     "(origin, direction, at)) return true;\n", "    return false;\n"},
 };
+
+/// The functions of all hooks that some effect has, and before them the names of all, for effects that ask
+/// others.
+struct HookTexts {
+    std::string heads, functions;
+    std::vector<ShaderDefine> defines;
+};
+
+HookTexts hookTextsOf(std::span<const Effect> effects) {
+    HookTexts texts;
+    for (const Hook& hook : kHooks) {
+        std::string calls;
+        for (const Effect& effect : effects)
+            if (const std::string& function = effect.*hook.function; !function.empty())
+                calls += hook.before + function + hook.behind;
+        if (calls.empty()) continue;
+        texts.defines.push_back({hook.define});
+        texts.heads += std::string(hook.head) + ";\n";
+        texts.functions += std::string(hook.head) + " {\n" + hook.first + calls + hook.last + "}\n";
+    }
+    return texts;
+}
 
 const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickCells,
                                                   std::span<const Effect> effects) {
@@ -303,28 +341,21 @@ const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickC
     if (const auto found = programs.find(key); found != programs.end()) return found->second;
     namespace text = shaders::render;
     std::vector<ShaderDefine> defines{{"CELLS", std::to_string(brickCells)}};
-    std::vector<ShaderText> shared{text::kBrick};
+    const HookTexts hooks = hookTextsOf(effects);
+    defines.insert(defines.end(), hooks.defines.begin(), hooks.defines.end());
+    std::vector<ShaderText> shared{text::kView, text::kBrick, text::kStops, text::kSamples, text::kClips};
     if (std::ranges::any_of(effects, &Effect::readsIndex)) {
         defines.push_back({"BRICK_INDEX_BINDING", "2"});
         shared.push_back(brickIndexShader());
     }
     shared.push_back(text::kBrickSample);
+    if (!effects.empty()) shared.push_back({"names of effects", hooks.heads});
     for (const Effect& effect : effects)
         for (const ShaderText& one : effect.texts)
             if (std::ranges::find(shared, one.name, &ShaderText::name) == shared.end()) shared.push_back(one);
-    std::string calls;
-    for (const Hook& hook : kHooks) {
-        std::string body;
-        for (const Effect& effect : effects)
-            if (const std::string& function = effect.*hook.function; !function.empty())
-                body += (hook.addsUp ? "    sum += (1.0 - sum.a) * " : "    ") + function + hook.call;
-        if (body.empty()) continue;
-        defines.push_back({hook.define});
-        calls += hook.begin + body + hook.end;
-    }
-    if (!calls.empty()) shared.push_back({"calls of effects", calls});
+    if (!effects.empty()) shared.push_back({"calls of effects", hooks.functions});
     GlProgram made = makeProgram(context,
-                                 {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kBrick}},
+                                 {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kView, text::kBrick}},
                                   {GL_FRAGMENT_SHADER, text::kBrickFragment, shared}},
                                  defines);
     return programs.emplace(key, std::move(made)).first->second;
@@ -386,7 +417,8 @@ void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scen
     const Vec3i& slots = pool.layout().slots;
     gl.ProgramUniform3i(program, bricks->uniform("slotsAlong"), slots.x, slots.y, slots.z);
     const EffectScene known = scene.forEffects(gl, *bricks);
-    for (const Effect& effect : options.effects) effect.setUniforms(known);
+    for (const Effect& effect : options.effects)
+        if (effect.setUniforms) effect.setUniforms(known);
 }
 
 void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs,

@@ -5,6 +5,7 @@
 
 #include "render/effects/bricks.h"
 #include "render/effects/isosurfaces.h"
+#include "render/effects/preintegration.h"
 #include "render/effects/shading.h"
 #include "scene/colour_maps.h"
 #include "tessera/error.h"
@@ -183,11 +184,18 @@ Effect readBrickEdges(const JsonNode& json) {
     return brickEdgesEffect(edges);
 }
 
+Effect readPreintegration(const JsonNode& json) {
+    json.expectKeys({});
+    return preintegrationEffect();
+}
+
 std::vector<Effect> readEffects(const JsonNode& json) {
-    json.expectKeys({"bricks", "isosurfaces", "shading"});
+    json.expectKeys({"bricks", "isosurfaces", "preintegration", "shading"});
     std::vector<Effect> effects;
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
     if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
+    if (const auto preintegration = json.find("preintegration"))
+        effects.push_back(readPreintegration(*preintegration));
     if (const auto shading = json.find("shading")) effects.push_back(readShading(*shading));
     return effects;
 }

@@ -51,7 +51,7 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
                               "opacity": [[0, 0], [0.5, 0.25], [0.5, 1]]},
         "layer": 0.5, "background": [0, 0.5, 1],
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
-        "effects": {"shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {},
+        "effects": {"shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
                     "isosurfaces": {"surfaces": [{"value": 3}, {"value": 1, "color": [1, 0, 0], "opacity": 0.5}]}},
         "size": [640, 480], "samples": 9, "slices": 4, "legend": false, "unit": "m/s"})");
     EXPECT_EQ(scene.field, "V");
@@ -77,10 +77,9 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_EQ(scene.slicesAVoxel, 4);
     EXPECT_FALSE(scene.hasLegend);
     EXPECT_EQ(scene.unit, "m/s");
-    ASSERT_EQ(scene.effects.size(), 3u);
-    EXPECT_EQ(scene.effects[0].name, "bricks");
-    EXPECT_EQ(scene.effects[1].name, "isosurfaces");
-    EXPECT_EQ(scene.effects[2].name, "shading");
+    std::vector<std::string> names;
+    for (const Effect& effect : scene.effects) names.push_back(effect.name);
+    EXPECT_EQ(names, (std::vector<std::string>{"bricks", "isosurfaces", "preintegration", "shading"}));
 }
 
 TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
@@ -128,6 +127,8 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
         {R"({"version": 1, "transfer_function": {"map": "gray", "stops": [{"value": 1, "opacity": 1}]}})",
          "transfer_function.map: can't stand beside stops"},
         {R"({"version": 1, "effects": {"glow": {}}})", "effects: unknown key \"glow\"; it knows bricks"},
+        {R"({"version": 1, "effects": {"preintegration": {"table": 2}}})",
+         "effects.preintegration: unknown key \"table\"; it knows none"},
         {R"({"version": 1, "effects": {"shading": {"ambient": 2}}})",
          "effects.shading.ambient: expected a number from 0 to 1"},
         {R"({"version": 1, "effects": {"shading": {"light": [0, 0, 0]}}})",

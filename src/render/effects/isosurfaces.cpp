@@ -21,7 +21,7 @@ Effect isosurfacesEffect(std::vector<Isosurface> surfaces, const Vec3d& towardsL
     namespace text = shaders::render;
     Effect effect;
     effect.name = "isosurfaces";
-    effect.texts = {text::kGradient, text::kLight, text::kIsosurfaces};
+    effect.texts = {text::kPoolPlace, text::kNear, text::kGradient, text::kLight, text::kIsosurfaces};
     effect.sheet = "isosurfacesSheet";
     effect.needsAllBricks = true;
     effect.readsIndex = true;

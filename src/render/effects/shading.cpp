@@ -15,7 +15,7 @@ Effect shadingEffect(const Shading& shading) {
     namespace text = shaders::render;
     Effect effect;
     effect.name = "shading";
-    effect.texts = {text::kGradient, text::kLight, text::kShading};
+    effect.texts = {text::kPoolPlace, text::kNear, text::kGradient, text::kLight, text::kShading};
     effect.shade = "shadingShade";
     effect.readsIndex = true;
     effect.setUniforms = [shading](const EffectScene& scene) {

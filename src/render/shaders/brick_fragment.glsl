@@ -1,13 +1,11 @@
 // The slices of one brick along the ray of one pixel.
-uniform vec3 forward, right, up;  // right and up over half the picture
-uniform vec4 pictureFromPixel;    // scale and offset
-uniform vec4 clips[32];           // normal and offset, relative to the eye
-uniform int clipCount;
+uniform vec4 pictureFromPixel;  // scale and offset
 uniform float slicesAVoxel, layersAWorldUnit;
 
 layout(location = 0) out vec4 color;
 
 const float kDark = 1e-4;
+const int kMostSurfaces = 64;  // of effects, along a ray
 
 // Colour times opacity, and opacity, before what there is so far.
 void add(vec4 shown, inout vec3 sum, inout float light) {
@@ -49,16 +47,36 @@ void main() {
     float slab = floor(begin * slabsALength - bricks[number].firstSlab);
     vec3 sum = vec3(0);
     float light = 1.0, cover = coverAt(from + begin * step);
+    int left = 4 * int(float(CELLS) * max(slicesAVoxel, 1.0));
 #ifdef FACE
     add(faceByEffects(from + begin * step), sum, light);
 #endif
-#ifdef SHEET
+#if defined(SHEET) || defined(CLASSIFY)
     float codeLast = 0.0, sampledTo = -1.0;
 #endif
-    for (int left = 4 * int(float(CELLS) * max(slicesAVoxel, 1.0)); begin < end && left > 0; --left) {
+#ifdef SURFACE
+    // The next one, the first where the brick begins or behind it.
+    float surface = surfaceBehind(origin, direction, begin > 0.0 ? intBitsToFloat(floatBitsToInt(begin) - 1) : -1.0);
+    left += kMostSurfaces;
+#endif
+    for (; begin < end && left > 0; --left) {
+#ifdef SURFACE
+        if (surface == begin) {
+            if (cover >= 0.0) add(surfaceByEffects(from + begin * step, origin, direction, begin), sum, light);
+            if (light < kDark) break;
+            surface = surfaceBehind(origin, direction, begin);
+        }
+#endif
         slab += 1.0;
         float next = min((bricks[number].firstSlab + slab) / slabsALength, end);
         if (left == 1) next = end;
+#ifdef SURFACE
+        // What comes before a surface is a slab of its own.
+        if (surface < next) {
+            next = surface;
+            slab -= 1.0;
+        }
+#endif
         if (!(next > begin)) continue;
         // The part in the mesh, coverage being taken as linear in between.
         float coverNext = coverAt(from + next * step);
@@ -66,31 +84,47 @@ void main() {
         float first = cover < 0.0 ? crossing : begin, last = coverNext < 0.0 ? crossing : next;
         bool isInside = max(cover, coverNext) >= 0.0 && last > first;
         cover = coverNext;
+#ifdef HIDE
+        isInside = isInside && !isHiddenByEffects(origin, direction, 0.5 * (begin + next));
+#endif
+        begin = next;
+        if (!isInside) continue;
+#if defined(SHEET) || defined(CLASSIFY)
+        // What a slab begins with the one before it has ended with.
+        vec3 there = from + first * step, beyond = from + last * step;
+        float codeThere = codeLast, codeBeyond;
+        bool hasEnds = (sampledTo == first || sampleBrick(there, codeThere)) && sampleBrick(beyond, codeBeyond);
+        if (hasEnds) {
+            codeLast = codeBeyond;
+            sampledTo = last;
+        }
+#endif
+#ifdef CLASSIFY
+        if (!hasEnds) continue;
+        float share;  // where in the slab it is seen
+        vec4 shown = classifyByEffects(codeThere, codeBeyond, (last - first) * layersAWorldUnit, share);
+#ifdef SHADE
+        if (shown.a > 0.0) shadeByEffects(shown, mix(there, beyond, share), direction);
+#endif
+        add(vec4(shown.rgb, 1.0) * shown.a, sum, light);
+#else
         float code;
         vec3 middle = from + 0.5 * (first + last) * step;
-        if (isInside && sampleBrick(middle, code)) {
-            vec4 shown = shownAt(code);
-            if (shown.a > 0.0) {
+        if (!sampleBrick(middle, code)) continue;
+        vec4 shown = shownAt(code);
+        if (shown.a > 0.0) {
 #ifdef SHADE
-                shadeByEffects(shown, middle, direction);
+            shadeByEffects(shown, middle, direction);
 #endif
-                float passed = shown.a < 1.0 ? pow(1.0 - shown.a, (last - first) * layersAWorldUnit) : 0.0;
-                sum += light * (1.0 - passed) * shown.rgb;
-                light *= passed;
-            }
-#ifdef SHEET
-            // What a slab begins with the one before it has ended with.
-            vec3 there = from + first * step, beyond = from + last * step;
-            float codeThere = codeLast, codeBeyond;
-            if ((sampledTo == first || sampleBrick(there, codeThere)) && sampleBrick(beyond, codeBeyond)) {
-                add(sheetByEffects(codeThere, codeBeyond, there, beyond, direction), sum, light);
-                codeLast = codeBeyond;
-                sampledTo = last;
-            }
-#endif
-            if (light < kDark) break;
+            float passed = shown.a < 1.0 ? pow(1.0 - shown.a, (last - first) * layersAWorldUnit) : 0.0;
+            sum += light * (1.0 - passed) * shown.rgb;
+            light *= passed;
         }
-        begin = next;
+#endif
+#ifdef SHEET
+        if (hasEnds) add(sheetByEffects(codeThere, codeBeyond, there, beyond, direction), sum, light);
+#endif
+        if (light < kDark) break;
     }
 #ifdef FACE
     add(faceByEffects(from + end * step), sum, light);

@@ -1,8 +1,6 @@
 // The boxes of bricks: the faces away from the eye are drawn, so that each pixel gets a fragment of a brick
 // once, from inside of it too. The boxes are a little larger than the bricks: whether a ray meets a brick is
 // for the fragment to say, as the rasterizer rounds otherwise and would leave cracks.
-uniform vec3 forward, right, up;  // right and up over half the picture
-uniform bool isParallel;
 uniform vec4 tileFromPicture;  // scale and offset
 uniform int firstBrick;
 
