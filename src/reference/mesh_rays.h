@@ -5,17 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "reference/ray_elements.h"
 #include "tessera/execution.h"
 #include "tessera/focus.h"
 #include "tessera/mesh.h"
 
 namespace tessera {
-
-/// A part of a ray, by distances from the eye, world units.
-struct RaySpan {
-    double begin = 0;
-    double end = 0;
-};
 
 /// Where the rays through the middles of a camera's pixels run inside a mesh: each is cut with the elements
 /// themselves, so pictures of several reconstructions have one outline, that of the mesh.

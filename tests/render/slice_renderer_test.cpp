@@ -216,6 +216,26 @@ TEST(SliceRenderer, AnEvenMediumHasTheOpacityOfTheRaysLengthInAnyLayout) {
     EXPECT_GE(depths, 3);
 }
 
+// Around a value at which alone a function is opaque exp(-1 / 2 layers) of the light comes through.
+TEST(SliceRenderer, WhatIsOpaqueAtOneValueAloneLetsLightThrough) {
+    TESSERA_NEEDS_GL(kPlatform);
+    Pictured pictured(
+        gridMesh({2, 2, 2}, Vec3d(0), Vec3d(1)), [](const Vec3d& p) { return p.x; }, pointFocus(Vec3d(0), 1),
+        SampleFormat::r32f, 65);
+    RenderOptions options = evenCube({{-2, 0.5, 0.5}, {1, 0, 0}, {0, 0, 1}, 35, 16, 16, 0.6});
+    // The value is one at a lattice point, not on a face of bricks.
+    const double spacing = 1.0 / 64, peak = 0.5 + 6 * spacing;
+    options.function =
+        stops({{peak - 0.25, {1, 1, 1}, 0}, {peak, {1, 1, 1}, 1}, {peak + 0.25, {1, 1, 1}, 0}});
+    options.layerWorld = 0.5;
+    // Slabs are counted from the eye: at one of these places the middle of one is where the value is met.
+    for (int shift = 0; shift < 4; ++shift) {
+        options.camera.eyeWorld.x = -2 + spacing * shift / 4;
+        for (const Rgba& pixel : pictured.draw(options).pixels)
+            ASSERT_NEAR(double(pixel[3]), 1 - std::exp(-1.0), 0.01) << shift;
+    }
+}
+
 TEST(SliceRenderer, RaysAlongFacesOfBricksAreDrawnOnce) {
     TESSERA_NEEDS_GL(kPlatform);
     Pictured pictured(gridMesh({3, 3, 3}, Vec3d(0), Vec3d(1)), one, pointFocus({0.3, 0.4, 0.6}, 0.1));
