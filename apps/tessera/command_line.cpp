@@ -392,7 +392,7 @@ void addRenderOptions(CLI::App& command, RenderArguments& a) {
         ->check(CLI::IsMember({1, 4, 9, 16}));
     command
         .add_option("--without", a.request.without,
-                    "leave out this effect of the scene: bricks, isosurfaces or shading; may be repeated")
+                    "leave out this effect of the scene, by its name there; may be repeated")
         ->allow_extra_args(false);
     command.add_flag("--explain", a.request.explains,
                      "tell what each effect costs, and how much of the picture it changes");

@@ -56,11 +56,14 @@ ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isO
     options.samplesAPixel = scene.samplesAPixel;
     options.effects = scene.effects;
     options.values = source.range();
+    options.boundsWorld = source.boundsWorld();
+    if (isOnScreen) picture.marks = linesOf(options.effects, {options.camera, options.boundsWorld}).marks;
     return picture;
 }
 
 RgbImage onScreen(const ScenePicture& picture, const RgbaImage& drawn) {
     RgbImage shown = overGround(drawn, picture.ground);
+    putMarks(shown, picture.marks, picture.ground);
     if (picture.hasLegend) putLegend(shown, picture.legend, coloursOf(picture.options.function));
     return shown;
 }

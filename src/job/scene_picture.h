@@ -14,6 +14,7 @@ namespace tessera {
 struct ScenePicture {
     RenderOptions options;
     std::array<double, 3> ground{};
+    PictureMarks marks;
     LegendOptions legend;
     bool hasLegend = false;    ///< it is asked for, and there is room for it
     bool lacksLegend = false;  ///< it is asked for, and there isn't

@@ -81,19 +81,20 @@ void fillBox(RgbImage& image, int x, int y, int width, int height, Rgb colour) {
         for (int i = 0; i < width; ++i) setPixel(image, x + i, y + j, colour);
 }
 
-int textWidth(const std::string& text) {
-    return std::max(0, int(decodeUtf8(text).size()) * kGlyphAdvance - 1) * kTextScale;
+int textWidth(const std::string& text, int scale = kTextScale) {
+    return std::max(0, int(decodeUtf8(text).size()) * kGlyphAdvance - 1) * scale;
 }
 
-void drawText(RgbImage& image, int x, int y, const std::string& text) {
+void drawText(RgbImage& image, int x, int y, const std::string& text, Rgb ink = kInk,
+              int scale = kTextScale) {
     for (char32_t code : decodeUtf8(text)) {
         const auto rows = glyphRows(code);
         for (int j = 0; j < kGlyphHeight; ++j)
             for (int i = 0; i < kGlyphWidth; ++i) {
                 if (rows[std::size_t(j)] >> (kGlyphWidth - 1 - i) & 1)
-                    fillBox(image, x + i * kTextScale, y + j * kTextScale, kTextScale, kTextScale, kInk);
+                    fillBox(image, x + i * scale, y + j * scale, scale, scale, ink);
             }
-        x += kGlyphAdvance * kTextScale;
+        x += kGlyphAdvance * scale;
     }
 }
 
@@ -274,6 +275,38 @@ void putLegend(RgbImage& picture, const LegendOptions& options,
     drawText(picture, left + kMargin, top + kMargin, options.title);
     drawBar(picture, left + kMargin, top + kMargin + shape.titleHeight, shape.barHeight, shape.labels,
             [&](double share) { return colourAt(shape.valueAt(share)); });
+}
+
+void putMarks(RgbImage& picture, const PictureMarks& marks, const std::array<double, 3>& ground) {
+    static_assert(kLetterDots[0] == kGlyphAdvance && kLetterDots[1] == kGlyphHeight);
+    const auto rgb = [](const std::array<double, 3>& color) {
+        const auto byte = [](double v) { return std::uint8_t(std::lround(255 * std::clamp(v, 0.0, 1.0))); };
+        return Rgb{byte(color[0]), byte(color[1]), byte(color[2])};
+    };
+    const auto whole = [](double v) { return int(std::lround(std::clamp(v, -1e6, 1e6))); };
+    for (const PictureBox& box : marks.boxes) {
+        const int left = whole(box.leftPixels), top = whole(box.topPixels);
+        fillBox(picture, left, top, whole(box.leftPixels + box.widthPixels) - left,
+                whole(box.topPixels + box.heightPixels) - top, rgb(box.color));
+    }
+    const int dot = marks.dotPixels;
+    std::vector<std::array<int, 4>> taken;  // left, top, right, bottom
+    for (const PictureWords& words : marks.words) {
+        const int wide = textWidth(words.text, dot), high = kGlyphHeight * dot;
+        const double middleX = words.placePixels[0] + words.direction[0] * wide / 2;
+        const double middleY = words.placePixels[1] + words.direction[1] * high / 2;
+        const int left = whole(middleX - wide / 2.0), top = whole(middleY - high / 2.0);
+        const std::array<int, 4> box{left - 2 * dot, top - dot, left + wide + 2 * dot, top + high + dot};
+        if (std::ranges::any_of(taken, [&](const std::array<int, 4>& other) {
+                return box[0] < other[2] && other[0] < box[2] && box[1] < other[3] && other[1] < box[3];
+            }))
+            continue;
+        taken.push_back(box);
+        for (const int x : {-dot, 0, dot})
+            for (const int y : {-dot, 0, dot})
+                if (x != 0 || y != 0) drawText(picture, left + x, top + y, words.text, rgb(ground), dot);
+        drawText(picture, left, top, words.text, rgb(words.color), dot);
+    }
 }
 
 void writePng(const std::string& path, const RgbImage& image) {

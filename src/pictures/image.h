@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/picture_marks.h"
 #include "base/rgba_image.h"
 #include "brick/seams.h"
 #include "mesh/field_range.h"
@@ -71,6 +72,10 @@ int legendPixels(const LegendOptions& options, int pictureWidth, int pictureHeig
 /// room. @param colourAt of a value.
 void putLegend(RgbImage& picture, const LegendOptions& options,
                const std::function<Rgb(double value)>& colourAt);
+
+/// Puts boxes and words onto a picture; words have a rim of the ground's colour, so that they can be read
+/// before anything.
+void putMarks(RgbImage& picture, const PictureMarks& marks, const std::array<double, 3>& ground);
 
 /// Throws IoError; nothing stands at `path` until the file is whole.
 void writePng(const std::string& path, const RgbImage& image);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "gl/gl_handles.h"
 #include "gl/shader_text.h"
 #include "mesh/field_range.h"
+#include "render/picture_lines.h"
 #include "tessera/transfer_function.h"
 #include "tessera/vec.h"
 
@@ -63,6 +65,13 @@ struct Effect {
     bool needsAllBricks = false;  ///< those too of which the transfer function shows nothing
     bool readsIndex = false;      ///< needs the pool's index of bricks
     std::function<void(const EffectScene&)> setUniforms;  ///< none: it has none
+    /// Lines in the volume, and marks on the picture. An effect may have nothing else.
+    std::function<PictureLines(const LineView&)> lines;
+    /// Of the picture's width and height, on each side: what a camera that is to be found leaves for it.
+    double marginShare = 0;
 };
+
+/// What effects draw in lines, and what they put onto the picture afterwards, in their order.
+PictureLines linesOf(std::span<const Effect> effects, const LineView& view);
 
 }  // namespace tessera

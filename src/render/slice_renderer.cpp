@@ -10,6 +10,7 @@
 #include "gl/gl_program.h"
 #include "refine/camera_view.h"
 #include "refine/wishes.h"
+#include "render/line_pass.h"
 #include "render/shaders.h"
 #include "render/visibility_order.h"
 #include "tessera/error.h"
@@ -95,6 +96,9 @@ class Scene {
     }
 
     const CameraView& view() const { return view_; }
+    /// Where places count from.
+    const Vec3d& eye() const { return eye_; }
+    double raySize() const { return pixelSize() / std::sqrt(options_.samplesAPixel); }
     /// Relative to the eye.
     const std::vector<HalfSpace>& clips() const { return clips_; }
 
@@ -198,7 +202,6 @@ class Scene {
         return nearest;
     }
     double pixelSize() const { return 2 * view_.high / options_.camera.heightPixels; }
-    double raySize() const { return pixelSize() / std::sqrt(options_.samplesAPixel); }
     /// Of the floats that the shaders count with nothing may be lost.
     void placeEye() {
         const double nearest = nearestDepth({box_.min - eye_, box_.max - eye_});
@@ -220,11 +223,6 @@ class Scene {
     bool needsAll_ = false;
     Box3d box_;         // of all bricks
     ValueRange range_;  // likewise
-};
-
-/// A part of the picture, in rays from its top left.
-struct PictureTile {
-    int x = 0, y = 0, width = 0, height = 0;
 };
 
 void checkOptions(const BrickPool& pool, const RenderOptions& options) {
@@ -261,6 +259,19 @@ void EffectScene::setDirection(const char* name, const Vec3d& value) const {
     set(name, length > 0 ? value / length : Vec3d(0));
 }
 
+PictureLines linesOf(std::span<const Effect> effects, const LineView& view) {
+    PictureLines all;
+    for (const Effect& effect : effects) {
+        if (!effect.lines) continue;
+        PictureLines lines = effect.lines(view);
+        all.segments.insert(all.segments.end(), lines.segments.begin(), lines.segments.end());
+        all.marks.dotPixels = std::max(all.marks.dotPixels, lines.marks.dotPixels);
+        all.marks.boxes.insert(all.marks.boxes.end(), lines.marks.boxes.begin(), lines.marks.boxes.end());
+        all.marks.words.insert(all.marks.words.end(), lines.marks.words.begin(), lines.marks.words.end());
+    }
+    return all;
+}
+
 // All that OpenGL has; only its thread looks at it.
 struct SliceRenderer::Device {
     std::map<std::string, GlProgram> programs;  // by cells and effects
@@ -269,13 +280,17 @@ struct SliceRenderer::Device {
     GlVertexArray vertices;
     GlTexture color, depth;
     GlFramebuffer target, closing;
+    std::optional<LinePass> lines;  // made for the first picture that has some
 
-    void prepare(GlContext& context, int brickCells, std::span<const Effect> effects);
-    const GlProgram& programOf(GlContext& context, int brickCells, std::span<const Effect> effects);
+    void prepare(GlContext& context, int brickCells, std::span<const Effect> effects, bool hasLines);
+    void makeTargets(GlContext& context);
+    const GlProgram& programOf(GlContext& context, int brickCells, std::span<const Effect> effects,
+                               bool hasLines);
     void setUniforms(const GlFunctions& gl, const Scene& scene, const BrickPool& pool,
                      const RenderOptions& options) const;
     void draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs, std::size_t brickCount,
-              const PictureTile& tile, const Vec3i& picture, std::size_t group, RenderCounts& counts) const;
+              const PictureTile& tile, const Vec3i& picture, std::size_t group, bool hasLines,
+              RenderCounts& counts) const;
 };
 
 /// Text of a function that calls those of all effects; none, and no define, where no effect has one.
@@ -335,14 +350,16 @@ HookTexts hookTextsOf(std::span<const Effect> effects) {
 }
 
 const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickCells,
-                                                  std::span<const Effect> effects) {
-    std::string key = std::to_string(brickCells);
-    for (const Effect& effect : effects) key += " " + effect.name;
+                                                  std::span<const Effect> effects, bool hasLines) {
+    std::string key = std::to_string(brickCells) + (hasLines ? " with lines" : "");
+    for (const Effect& effect : effects)
+        if (!effect.texts.empty()) key += " " + effect.name;
     if (const auto found = programs.find(key); found != programs.end()) return found->second;
     namespace text = shaders::render;
     std::vector<ShaderDefine> defines{{"CELLS", std::to_string(brickCells)}};
     const HookTexts hooks = hookTextsOf(effects);
     defines.insert(defines.end(), hooks.defines.begin(), hooks.defines.end());
+    if (hasLines) defines.push_back({"LINES"});
     std::vector<ShaderText> shared{text::kView, text::kBrick, text::kStops, text::kSamples, text::kClips};
     if (std::ranges::any_of(effects, &Effect::readsIndex)) {
         defines.push_back({"BRICK_INDEX_BINDING", "2"});
@@ -361,13 +378,18 @@ const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickC
     return programs.emplace(key, std::move(made)).first->second;
 }
 
-void SliceRenderer::Device::prepare(GlContext& context, int brickCells, std::span<const Effect> effects) {
+void SliceRenderer::Device::prepare(GlContext& context, int brickCells, std::span<const Effect> effects,
+                                    bool hasLines) {
     namespace text = shaders::render;
-    bricks = &programOf(context, brickCells, effects);
+    bricks = &programOf(context, brickCells, effects, hasLines);
     if (!close)
         close = makeProgram(
             context, {{GL_VERTEX_SHADER, text::kCloseVertex}, {GL_FRAGMENT_SHADER, text::kCloseFragment}});
-    if (color) return;
+    if (!color) makeTargets(context);
+    if (hasLines && !lines) lines.emplace(context, kTile, color, depth);
+}
+
+void SliceRenderer::Device::makeTargets(GlContext& context) {
     Device made;
     made.vertices = GlVertexArray(context);
     made.color = GlTexture(context, GL_TEXTURE_2D, GL_RGBA32F, kTile, kTile);
@@ -423,14 +445,14 @@ void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scen
 
 void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs,
                                  std::size_t brickCount, const PictureTile& tile, const Vec3i& picture,
-                                 std::size_t group, RenderCounts& counts) const {
+                                 std::size_t group, bool hasLines, RenderCounts& counts) const {
     const GlFunctions& gl = context.functions();
     const GLuint program = bricks->id();
     // Of a picture from -1 to 1, right and up.
     const double wide = picture.x, high = picture.y;
     const double left = tile.x, below = high - tile.y - tile.height;
-    gl.ProgramUniform4f(program, bricks->uniform("pictureFromPixel"), float(2 / wide), float(2 / high),
-                        float(2 * left / wide - 1), float(2 * below / high - 1));
+    gl.ProgramUniform4fv(program, bricks->uniform("pictureFromPixel"), 1,
+                         pictureFromPixel(tile, picture).data());
     gl.ProgramUniform4f(program, bricks->uniform("tileFromPicture"), float(wide / tile.width),
                         float(high / tile.height), float((wide - 2 * left) / tile.width - 1),
                         float((high - 2 * below) / tile.height - 1));
@@ -445,7 +467,8 @@ void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std:
     gl.DepthFunc(GL_LESS);
     gl.Enable(GL_CULL_FACE);
     const auto drawBricks = [&] {
-        gl.BindFramebuffer(GL_FRAMEBUFFER, target.id());
+        gl.BindFramebuffer(GL_FRAMEBUFFER, hasLines ? lines->target().id() : target.id());
+        if (hasLines) lines->bind(gl);
         gl.UseProgram(program);
         gl.DepthMask(GL_FALSE);
         gl.CullFace(GL_FRONT);
@@ -482,6 +505,10 @@ void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std:
             drawBricks();
         }
     }
+    if (hasLines) {
+        lines->compose(gl);
+        ++counts.draws;
+    }
 }
 
 SliceRenderer::SliceRenderer(GlThread& thread)
@@ -515,7 +542,11 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     RenderCounts count;
     count.bricks = std::int64_t(seen.size());
     count.unseenBricks = std::int64_t(bricks.size() - seen.size());
-    if (seen.empty()) {
+    const LineView lineView{options.camera, options.boundsWorld};
+    const ProjectedLines lines = projectLines(linesOf(options.effects, lineView).segments, options.within,
+                                              options.camera, scene.eye(), side);
+    const bool hasLines = !lines.lines.empty();
+    if (seen.empty() && !hasLines) {
         if (counts) *counts = count;
         return image;
     }
@@ -531,11 +562,13 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     const std::shared_ptr<Uploaded> uploaded(
         new Uploaded, [this](Uploaded* buffers) { thread_.run([buffers](GlContext&) { delete buffers; }); });
     thread_.run([&](GlContext& context) {
-        device_->prepare(context, pool.brickCells(), options.effects);
+        device_->prepare(context, pool.brickCells(), options.effects, hasLines);
+        if (hasLines) device_->lines->take(context, lines, scene.view(), scene.raySize());
         uploaded->bricks = GlBuffer(context, std::span(placed));
         uploaded->stops = GlBuffer(context, std::span(stops));
         count.deviceBytes = uploaded->bricks.bytes() + uploaded->stops.bytes() +
-                            std::int64_t(kTile) * kTile * std::int64_t(sizeof(Rgba) + sizeof(float));
+                            std::int64_t(kTile) * kTile * std::int64_t(sizeof(Rgba) + sizeof(float)) +
+                            (hasLines ? device_->lines->deviceBytes() : 0);
     });
     for (int top = 0; top < image.height; top += pixelsATile)
         for (int left = 0; left < image.width; left += pixelsATile) {
@@ -547,11 +580,15 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
             thread_.run([&](GlContext& context) {
                 const GlFunctions& gl = context.functions();
                 const Timer timer;
+                if (hasLines) {
+                    device_->lines->drawLines(gl, tile, picture);
+                    ++count.draws;
+                }
                 device_->setUniforms(gl, scene, pool, options);
                 if (state.index) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, state.index->id());
                 gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, uploaded->bricks.id());
                 gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, uploaded->stops.id());
-                device_->draw(context, pool, runs, placed.size(), tile, picture, group, count);
+                device_->draw(context, pool, runs, placed.size(), tile, picture, group, hasLines, count);
                 gl.GetTextureSubImage(device_->color.id(), 0, 0, 0, 0, tile.width, tile.height, 1, GL_RGBA,
                                       GL_FLOAT, GLsizei(rays.size() * sizeof(Rgba)), rays.data());
                 count.drawMs += timer.elapsedMs();

@@ -32,6 +32,8 @@ struct RenderOptions {
     ValueRange values;
     /// In the order in which they shade.
     std::vector<Effect> effects;
+    /// What of the pool is data, for effects that show its extent.
+    Box3d boundsWorld{};
 };
 
 struct RenderCounts {

@@ -46,12 +46,12 @@ std::vector<std::array<double, 2>> opacitiesOf(std::span<const double> histogram
 }
 
 /// So far back along `forward` that the box is within the picture.
-Camera fitted(Camera camera, const Box3d& box, bool isParallel, int legendPixels) {
+Camera fitted(Camera camera, const Box3d& box, bool isParallel, int legendPixels, double margin) {
     const Vec3d middle = 0.5 * (box.min + box.max);
     camera.eyeWorld = middle;
     const CameraView view = viewOf(camera);
     const double besides = std::min(double(legendPixels) / camera.widthPixels, 0.25);
-    const double shareWide = 1 - 2 * std::max(kMargin, besides), shareHigh = 1 - 2 * kMargin;
+    const double shareWide = 1 - 2 * std::max(margin, besides), shareHigh = 1 - 2 * margin;
     const double wide = shareWide * view.wide, high = shareHigh * view.high;
     double back = 0, halfHeight = 0, deepest = 0;
     for (unsigned c = 0; c < 8; ++c) {
@@ -91,7 +91,9 @@ Camera cameraOf(const Scene& scene, const Box3d& boundsWorld, int legendPixels) 
     };
     if (!from.eyeWorld) {
         lookAlong(from.direction);
-        return fitted(camera, boundsWorld, from.isParallel, scene.hasLegend ? legendPixels : 0);
+        double margin = kMargin;
+        for (const Effect& effect : scene.effects) margin += effect.marginShare;
+        return fitted(camera, boundsWorld, from.isParallel, scene.hasLegend ? legendPixels : 0, margin);
     }
     const Vec3d target = from.targetWorld.value_or(0.5 * (boundsWorld.min + boundsWorld.max));
     if (target == *from.eyeWorld)

@@ -69,6 +69,7 @@ struct Scene {
     double slicesAVoxel = 2;
     bool hasLegend = true;
     std::string unit;             ///< of the values, for the legend
+    std::string lengthUnit;       ///< of places, for axes and the scale bar
     std::vector<Effect> effects;  ///< in the order in which they are applied
 };
 

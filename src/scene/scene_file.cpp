@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/effects/axes.h"
 #include "render/effects/bricks.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
+#include "render/effects/scale_bar.h"
 #include "render/effects/shading.h"
 #include "scene/colour_maps.h"
 #include "tessera/error.h"
@@ -148,6 +150,11 @@ double readShare(const JsonNode& json, const char* key, double otherwise) {
     return found ? found->number(0, 1) : otherwise;
 }
 
+double readWidth(const JsonNode& json, double otherwise) {
+    const auto width = json.find("width");
+    return width ? width->number(0.1, 100) : otherwise;
+}
+
 Effect readShading(const JsonNode& json) {
     json.expectKeys({"light", "ambient", "diffuse", "specular", "shininess"});
     Shading shading;
@@ -179,7 +186,7 @@ Effect readIsosurfaces(const JsonNode& json) {
 Effect readBrickEdges(const JsonNode& json) {
     json.expectKeys({"width", "opacity"});
     BrickEdges edges;
-    if (const auto width = json.find("width")) edges.widthPixels = width->number(0.1, 100);
+    edges.widthPixels = readWidth(json, edges.widthPixels);
     edges.opacity = readShare(json, "opacity", edges.opacity);
     return brickEdgesEffect(edges);
 }
@@ -189,13 +196,38 @@ Effect readPreintegration(const JsonNode& json) {
     return preintegrationEffect();
 }
 
-std::vector<Effect> readEffects(const JsonNode& json) {
-    json.expectKeys({"bricks", "isosurfaces", "preintegration", "shading"});
+/// Of lines and words that stand out from the ground.
+std::array<double, 3> inkOn(const std::array<double, 3>& ground) {
+    const double light = 0.3 * ground[0] + 0.6 * ground[1] + 0.1 * ground[2];
+    return light > 0.5 ? std::array{0.25, 0.25, 0.25} : std::array{0.8, 0.8, 0.8};
+}
+
+Effect readAxes(const JsonNode& json, const Scene& scene) {
+    json.expectKeys({"color", "width"});
+    Axes axes;
+    axes.widthPixels = readWidth(json, axes.widthPixels);
+    const auto color = json.find("color");
+    axes.color = color ? readColour(*color) : inkOn(scene.ground);
+    axes.unit = scene.lengthUnit;
+    return axesEffect(axes);
+}
+
+Effect readScaleBar(const JsonNode& json, const Scene& scene) {
+    json.expectKeys({"color"});
+    const auto color = json.find("color");
+    return scaleBarEffect({color ? readColour(*color) : inkOn(scene.ground), scene.lengthUnit});
+}
+
+/// @param scene what is read already.
+std::vector<Effect> readEffects(const JsonNode& json, const Scene& scene) {
+    json.expectKeys({"axes", "bricks", "isosurfaces", "preintegration", "scale_bar", "shading"});
     std::vector<Effect> effects;
+    if (const auto axes = json.find("axes")) effects.push_back(readAxes(*axes, scene));
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
     if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
     if (const auto preintegration = json.find("preintegration"))
         effects.push_back(readPreintegration(*preintegration));
+    if (const auto bar = json.find("scale_bar")) effects.push_back(readScaleBar(*bar, scene));
     if (const auto shading = json.find("shading")) effects.push_back(readShading(*shading));
     return effects;
 }
@@ -230,7 +262,7 @@ Scene readScene(const std::string& path) {
 Scene sceneFrom(const JsonNode& json) {
     json.expectKeys({"$schema", "version", "field", "component", "camera", "transfer_function", "layer",
                      "background", "bricks", "clip", "size", "samples", "slices", "legend", "unit",
-                     "effects"});
+                     "length_unit", "effects"});
     if (json.at("version").number() != kVersion) json.at("version").fail("1, the version of this format");
     Scene scene;
     if (const auto field = json.find("field")) scene.field = field->text();
@@ -254,8 +286,9 @@ Scene sceneFrom(const JsonNode& json) {
     }
     if (const auto slices = json.find("slices")) scene.slicesAVoxel = slices->number(0.125, 64);
     if (const auto legend = json.find("legend")) scene.hasLegend = legend->flag();
-    if (const auto effects = json.find("effects")) scene.effects = readEffects(*effects);
     if (const auto unit = json.find("unit")) scene.unit = unit->text();
+    if (const auto unit = json.find("length_unit")) scene.lengthUnit = unit->text();
+    if (const auto effects = json.find("effects")) scene.effects = readEffects(*effects, scene);
     return scene;
 }
 

@@ -1200,6 +1200,18 @@ class Pictures(AppTest):
         self.assertEqual(self.pixels(), volume)
         self.reject(2, "--without bricks", "render", self.vdb, "--scene", self.scene(), "-o", "x.png", "--without", "bricks")
 
+    def test_axes_and_a_scale_bar_are_put_onto_the_picture(self):
+        self.render("--scene", self.scene(legend=False))
+        plain = self.pixels()
+        self.render("--scene", self.scene(legend=False, length_unit="m", effects={"scale_bar": {"color": [1, 0, 0]}}))
+        barred = self.pixels()
+        self.assertNotEqual(barred, plain)
+        path = self.scene(legend=False, effects={"axes": {}, "scale_bar": {"color": [1, 0, 0]}})
+        self.render("--scene", path)
+        self.assertNotEqual(self.pixels(), barred)
+        report = self.render("--scene", path, "--without", "axes")
+        self.assertEqual(report["draw_calls"], self.render("--scene", self.scene(legend=False))["draw_calls"])
+
     def test_a_picture_goes_to_standard_output(self):
         command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
         result = subprocess.run(command, capture_output=True, check=True, timeout=300)

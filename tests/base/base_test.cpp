@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/floor_div.h"
 #include "base/parallel.h"
+#include "base/round_numbers.h"
 #include "base/timer.h"
 #include "tessera/error.h"
 #include "tessera/execution.h"
@@ -100,6 +101,22 @@ TEST(FloorDiv, RoundsTowardsMinusInfinity) {
     EXPECT_EQ(floorDiv(-1, 4), -1);
     EXPECT_EQ(floorDiv(-4, 4), -1);
     EXPECT_EQ(floorDiv(-5, 4), -2);
+}
+
+TEST(RoundNumbers, AreOneTwoAndFiveTimesPowersOfTen) {
+    EXPECT_DOUBLE_EQ(roundLengthBelow(7), 5);
+    EXPECT_DOUBLE_EQ(roundLengthBelow(0.0499), 0.02);
+    EXPECT_DOUBLE_EQ(roundLengthBelow(1000), 1000);
+    EXPECT_DOUBLE_EQ(roundLengthBelow(0.3 - 0.1), 0.2);
+    EXPECT_DOUBLE_EQ(roundLengthAbove(7), 10);
+    EXPECT_DOUBLE_EQ(roundLengthAbove(0.011), 0.02);
+    EXPECT_DOUBLE_EQ(roundLengthAbove(1e-9), 1e-9);
+    EXPECT_EQ(roundNumberText(3 * 0.1, 0.1), "0.3");
+    EXPECT_EQ(roundNumberText(-1e-17, 0.5), "0");
+    EXPECT_EQ(roundNumberText(1500, 500), "1500");
+    EXPECT_EQ(roundNumberText(2, 0.05), "2.00");
+    EXPECT_EQ(roundNumberText(3e-7, 1e-7), "3e-07");
+    EXPECT_EQ(roundNumberText(1.5e9, 5e8), "1.5e+09");
 }
 
 TEST(PeakMemory, GrowsWithWhatIsUsed) {

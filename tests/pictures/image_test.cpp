@@ -127,6 +127,42 @@ TEST(Picture, ConstantEmptyAndOddPicturesCanBeDrawn) {
     EXPECT_GT(drawPicture(huge, options).width, 44 * 12);
 }
 
+TEST(Picture, MarksStandWhereTheyAreAndNotUponEachOther) {
+    RgbImage picture = overGround({40, 30, std::vector<Rgba>(40 * 30)}, {0, 0, 0});
+    PictureMarks marks;
+    marks.boxes.push_back({2, 25, 10, 3, {1, 0, 0}});
+    const auto words = [](double x, const std::array<double, 2>& direction, const MarkColor& color) {
+        return PictureWords{"I", {x, 10}, direction, color};
+    };
+    marks.words = {words(20, {1, 0}, {0, 1, 0}), words(22, {1, 0}, {0, 0, 1}), words(14, {-1, 0}, {1, 1, 0})};
+    putMarks(picture, marks, {0, 0, 0});
+    const auto at = [&](int x, int y) {
+        const std::uint8_t* p = picture.rgb.data() + 3 * (y * 40 + x);
+        return Rgb{p[0], p[1], p[2]};
+    };
+    int red = 0, green = 0, blue = 0, yellow = 0;
+    for (int y = 0; y < 30; ++y)
+        for (int x = 0; x < 40; ++x) {
+            red += at(x, y) == Rgb{255, 0, 0};
+            const bool isGreen = at(x, y) == Rgb{0, 255, 0}, isYellow = at(x, y) == Rgb{255, 255, 0};
+            green += isGreen, yellow += isYellow;
+            blue += at(x, y) == Rgb{0, 0, 255};
+            // To the right of its place, and to the left of it.
+            if (isGreen) {
+                EXPECT_GE(x, 20);
+            }
+            if (isYellow) {
+                EXPECT_LT(x, 14);
+            }
+        }
+    EXPECT_EQ(red, 30);
+    EXPECT_EQ(at(2, 25), (Rgb{255, 0, 0}));
+    EXPECT_EQ(at(11, 27), (Rgb{255, 0, 0}));
+    EXPECT_EQ(green, 3 + 5 + 3);
+    EXPECT_EQ(yellow, green);
+    EXPECT_EQ(blue, 0) << "it would lie on the first";
+}
+
 TEST(Picture, PngReadsBackAndFailsCleanly) {
     std::string pattern = (fs::temp_directory_path() / "tessera_png_XXXXXX").string();
     ASSERT_NE(mkdtemp(pattern.data()), nullptr);

@@ -11,6 +11,7 @@
 #include "gl_calls.h"
 #include "pictured.h"
 #include "refine/camera_view.h"
+#include "render/effects/axes.h"
 #include "render/effects/bricks.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
@@ -273,7 +274,7 @@ TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
 
 /// One of each.
 std::vector<Effect> everyEffect() {
-    return {brickEdgesEffect({}), isosurfacesEffect({{.value = 0.6}}), preintegrationEffect(),
+    return {axesEffect({}), brickEdgesEffect({}), isosurfacesEffect({{.value = 0.6}}), preintegrationEffect(),
             shadingEffect({})};
 }
 
@@ -288,6 +289,7 @@ class EffectCalls : public testing::Test {
         options.camera = lookAt({3, -2, 2.5}, Vec3d(0), 24);
         options.channel = 1;
         options.function = even(0.3);
+        options.boundsWorld = {Vec3d(-1), Vec3d(1)};
     }
     GlCalls drawnBy(SliceRenderer& renderer, const std::vector<Effect>& effects) {
         options.effects = effects;

@@ -51,7 +51,9 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
                               "opacity": [[0, 0], [0.5, 0.25], [0.5, 1]]},
         "layer": 0.5, "background": [0, 0.5, 1],
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
-        "effects": {"shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
+        "length_unit": "mm",
+        "effects": {"axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {},
+                    "preintegration": {},
                     "isosurfaces": {"surfaces": [{"value": 3}, {"value": 1, "color": [1, 0, 0], "opacity": 0.5}]}},
         "size": [640, 480], "samples": 9, "slices": 4, "legend": false, "unit": "m/s"})");
     EXPECT_EQ(scene.field, "V");
@@ -77,9 +79,14 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_EQ(scene.slicesAVoxel, 4);
     EXPECT_FALSE(scene.hasLegend);
     EXPECT_EQ(scene.unit, "m/s");
+    EXPECT_EQ(scene.lengthUnit, "mm");
     std::vector<std::string> names;
     for (const Effect& effect : scene.effects) names.push_back(effect.name);
-    EXPECT_EQ(names, (std::vector<std::string>{"bricks", "isosurfaces", "preintegration", "shading"}));
+    EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "isosurfaces", "preintegration", "scale_bar",
+                                               "shading"}));
+    // Units are in what effects write.
+    const LineView view{{{0, -9, 0}, {0, 1, 0}, {0, 0, 1}}, {Vec3d(-1), Vec3d(1)}};
+    EXPECT_TRUE(linesOf(scene.effects, view).marks.words.back().text.ends_with(" mm"));
 }
 
 TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
@@ -126,7 +133,13 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
          "transfer_function.stops[0].opacity: expected a number"},
         {R"({"version": 1, "transfer_function": {"map": "gray", "stops": [{"value": 1, "opacity": 1}]}})",
          "transfer_function.map: can't stand beside stops"},
-        {R"({"version": 1, "effects": {"glow": {}}})", "effects: unknown key \"glow\"; it knows bricks"},
+        {R"({"version": 1, "effects": {"glow": {}}})", "effects: unknown key \"glow\"; it knows axes"},
+        {R"({"version": 1, "effects": {"axes": {"width": 0}}})", "effects.axes.width: expected a number"},
+        {R"({"version": 1, "effects": {"axes": {"color": [2, 0, 0]}}})",
+         "effects.axes.color: expected three"},
+        {R"({"version": 1, "effects": {"scale_bar": {"length": 1}}})",
+         "effects.scale_bar: unknown key \"length\""},
+        {R"({"version": 1, "length_unit": 1})", "length_unit: expected a text"},
         {R"({"version": 1, "effects": {"preintegration": {"table": 2}}})",
          "effects.preintegration: unknown key \"table\"; it knows none"},
         {R"({"version": 1, "effects": {"shading": {"ambient": 2}}})",

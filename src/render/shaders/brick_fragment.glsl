@@ -3,6 +3,11 @@ uniform vec4 pictureFromPixel;  // scale and offset
 uniform float slicesAVoxel, layersAWorldUnit;
 
 layout(location = 0) out vec4 color;
+#ifdef LINES
+layout(location = 1) out vec4 behind;  // what lies behind a line
+layout(binding = 3) uniform sampler2D lineColors;
+layout(binding = 4) uniform sampler2D lineDistances;
+#endif
 
 const float kDark = 1e-4;
 const int kMostSurfaces = 64;  // of effects, along a ray
@@ -12,6 +17,17 @@ void add(vec4 shown, inout vec3 sum, inout float light) {
     sum += light * shown.rgb;
     light *= 1.0 - shown.a;
 }
+
+#ifdef LINES
+// Where a ray comes to the line, what it has met becomes what is before the line.
+void comeTo(float place, float line, inout vec4 before, inout bool isBehind, inout vec3 sum, inout float light) {
+    if (isBehind || place < line) return;
+    before = vec4(sum, 1.0 - light);
+    isBehind = true;
+    sum = vec3(0);
+    light = 1.0;
+}
+#endif
 
 void main() {
     vec2 place = gl_FragCoord.xy * pictureFromPixel.xy + pictureFromPixel.zw;
@@ -41,6 +57,12 @@ void main() {
         if (rise < 0.0) end = min(end, missing / rise);
         if (rise == 0.0 && missing > 0.0) discard;
     }
+#ifdef LINES
+    float line = texelFetch(lineDistances, ivec2(gl_FragCoord.xy), 0).r;
+    if (texelFetch(lineColors, ivec2(gl_FragCoord.xy), 0).a == 1.0) end = min(end, line);
+    vec4 before = vec4(0);
+    bool isBehind = false;
+#endif
     if (!(begin < end)) discard;
 
     float slabsALength = dot(direction, forward) * slicesAVoxel / spacing;
@@ -48,6 +70,9 @@ void main() {
     vec3 sum = vec3(0);
     float light = 1.0, cover = coverAt(from + begin * step);
     int left = 4 * int(float(CELLS) * max(slicesAVoxel, 1.0));
+#ifdef LINES
+    comeTo(begin, line, before, isBehind, sum, light);
+#endif
 #ifdef FACE
     add(faceByEffects(from + begin * step), sum, light);
 #endif
@@ -60,6 +85,9 @@ void main() {
     left += kMostSurfaces;
 #endif
     for (; begin < end && left > 0; --left) {
+#ifdef LINES
+        comeTo(begin, line, before, isBehind, sum, light);
+#endif
 #ifdef SURFACE
         if (surface == begin) {
             if (cover >= 0.0) add(surfaceByEffects(from + begin * step, origin, direction, begin), sum, light);
@@ -70,10 +98,17 @@ void main() {
         slab += 1.0;
         float next = min((bricks[number].firstSlab + slab) / slabsALength, end);
         if (left == 1) next = end;
+#if defined(SURFACE) || defined(LINES)
+        // What comes before a surface or a line is a slab of its own.
+        float cut = 1e38;
 #ifdef SURFACE
-        // What comes before a surface is a slab of its own.
-        if (surface < next) {
-            next = surface;
+        cut = surface;
+#endif
+#ifdef LINES
+        if (!isBehind) cut = min(cut, line);
+#endif
+        if (cut < next) {
+            next = cut;
             slab -= 1.0;
         }
 #endif
@@ -129,8 +164,16 @@ void main() {
 #endif
         if (light < kDark) break;
     }
+#ifdef LINES
+    comeTo(end, line, before, isBehind, sum, light);
+#endif
 #ifdef FACE
     add(faceByEffects(from + end * step), sum, light);
 #endif
+#ifdef LINES
+    color = isBehind ? before : vec4(sum, 1.0 - light);
+    behind = isBehind ? vec4(sum, 1.0 - light) : vec4(0);
+#else
     color = vec4(sum, 1.0 - light);
+#endif
 }
