@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <span>
 #include <string>
@@ -10,6 +11,7 @@
 #include "gl/shader_text.h"
 #include "mesh/field_range.h"
 #include "render/picture_lines.h"
+#include "tessera/focus.h"
 #include "tessera/transfer_function.h"
 #include "tessera/vec.h"
 
@@ -27,10 +29,18 @@ struct EffectScene {
     Vec3d eyeWorld{0};  ///< places in shaders are relative to it
     const TransferFunction& function;
 
+    void set(const char* name, int value) const;
     void set(const char* name, double value) const;
     void set(const char* name, const Vec3d& value) const;
+    /// Of at least one.
+    void set(const char* name, std::span<const GLint> values) const;
+    void set(const char* name, std::span<const float> values) const;
+    void set(const char* name, std::span<const std::array<float, 4>> values) const;
     /// With the length 1; a vector of the length 0 as it is.
     void setDirection(const char* name, const Vec3d& value) const;
+    /// As the shader has planes: a normal of length 1, so that no product of floats over- or underflows, and
+    /// the offset relative to the eye.
+    std::array<float, 4> planeFromEye(const HalfSpace& half) const;
 };
 
 /// Something that a picture shows beside the volume itself. The shader is put together from the effects that

@@ -80,8 +80,7 @@ class Scene {
         }
         if (!bricks.empty()) placeEye();
         for (const HalfSpace& half : options.within)
-            clips_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye_)});
-        seen_ = clips_;
+            seen_.push_back({half.normalWorld, half.offsetWorld - glm::dot(half.normalWorld, eye_)});
         const double wide = view_.wide, high = view_.high;
         seen_.push_back({view_.forward, 0});
         for (const double sign : {-1.0, 1.0}) {
@@ -99,8 +98,6 @@ class Scene {
     /// Where places count from.
     const Vec3d& eye() const { return eye_; }
     double raySize() const { return pixelSize() / std::sqrt(options_.samplesAPixel); }
-    /// Relative to the eye.
-    const std::vector<HalfSpace>& clips() const { return clips_; }
 
     bool isSeen(const PlacedBrick& brick) const {
         if (!brick.isCovered || brick.range.empty()) return false;
@@ -219,7 +216,7 @@ class Scene {
     const RenderOptions& options_;
     CameraView view_;
     Vec3d eye_;
-    std::vector<HalfSpace> clips_, seen_;
+    std::vector<HalfSpace> seen_;  // relative to the eye
     bool needsAll_ = false;
     Box3d box_;         // of all bricks
     ValueRange range_;  // likewise
@@ -246,12 +243,34 @@ void checkOptions(const BrickPool& pool, const RenderOptions& options) {
 
 }  // namespace
 
+void EffectScene::set(const char* name, int value) const {
+    gl.ProgramUniform1i(program.id(), program.uniform(name), value);
+}
+
 void EffectScene::set(const char* name, double value) const {
     gl.ProgramUniform1f(program.id(), program.uniform(name), float(value));
 }
 
 void EffectScene::set(const char* name, const Vec3d& value) const {
     gl.ProgramUniform3f(program.id(), program.uniform(name), float(value.x), float(value.y), float(value.z));
+}
+
+void EffectScene::set(const char* name, std::span<const GLint> values) const {
+    gl.ProgramUniform1iv(program.id(), program.uniform(name), GLsizei(values.size()), values.data());
+}
+
+void EffectScene::set(const char* name, std::span<const float> values) const {
+    gl.ProgramUniform1fv(program.id(), program.uniform(name), GLsizei(values.size()), values.data());
+}
+
+void EffectScene::set(const char* name, std::span<const std::array<float, 4>> values) const {
+    gl.ProgramUniform4fv(program.id(), program.uniform(name), GLsizei(values.size()), values[0].data());
+}
+
+std::array<float, 4> EffectScene::planeFromEye(const HalfSpace& half) const {
+    const double length = glm::length(half.normalWorld);
+    const std::array<float, 3> n = floats(half.normalWorld / length);
+    return {n[0], n[1], n[2], float((half.offsetWorld - glm::dot(half.normalWorld, eyeWorld)) / length)};
 }
 
 void EffectScene::setDirection(const char* name, const Vec3d& value) const {
@@ -366,11 +385,11 @@ const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickC
         shared.push_back(brickIndexShader());
     }
     shared.push_back(text::kBrickSample);
-    if (!effects.empty()) shared.push_back({"names of effects", hooks.heads});
+    if (!hooks.heads.empty()) shared.push_back({"names of effects", hooks.heads});
     for (const Effect& effect : effects)
         for (const ShaderText& one : effect.texts)
             if (std::ranges::find(shared, one.name, &ShaderText::name) == shared.end()) shared.push_back(one);
-    if (!effects.empty()) shared.push_back({"calls of effects", hooks.functions});
+    if (!hooks.functions.empty()) shared.push_back({"calls of effects", hooks.functions});
     GlProgram made = makeProgram(context,
                                  {{GL_VERTEX_SHADER, text::kBrickVertex, {text::kView, text::kBrick}},
                                   {GL_FRAGMENT_SHADER, text::kBrickFragment, shared}},
@@ -411,34 +430,21 @@ void SliceRenderer::Device::makeTargets(GlContext& context) {
 
 void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scene, const BrickPool& pool,
                                         const RenderOptions& options) const {
-    const GLuint program = bricks->id();
-    const auto vector = [&](const char* name, const Vec3d& v) {
-        gl.ProgramUniform3f(program, bricks->uniform(name), float(v.x), float(v.y), float(v.z));
-    };
-    const auto number = [&](const char* name, double v) {
-        gl.ProgramUniform1f(program, bricks->uniform(name), float(v));
-    };
-    const CameraView& view = scene.view();
-    vector("forward", view.forward);
-    vector("right", view.wide * view.right);
-    vector("up", view.high * view.up);
-    gl.ProgramUniform1i(program, bricks->uniform("isParallel"), view.isParallel);
-    gl.ProgramUniform1i(program, bricks->uniform("component"), options.channel % kChannelsAGroup);
-    gl.ProgramUniform1i(program, bricks->uniform("clipCount"), int(scene.clips().size()));
-    std::vector<std::array<float, 4>> clips;
-    for (const HalfSpace& half : scene.clips()) {
-        // Of length 1, so that no product of floats over- or underflows.
-        const double length = glm::length(half.normalWorld);
-        const std::array<float, 3> n = floats(half.normalWorld / length);
-        clips.push_back({n[0], n[1], n[2], float(half.offsetWorld / length)});
-    }
-    if (!clips.empty())
-        gl.ProgramUniform4fv(program, bricks->uniform("clips"), int(clips.size()), clips[0].data());
-    number("slicesAVoxel", options.slicesAVoxel);
-    number("layersAWorldUnit", 1 / options.layerWorld);
-    const Vec3i& slots = pool.layout().slots;
-    gl.ProgramUniform3i(program, bricks->uniform("slotsAlong"), slots.x, slots.y, slots.z);
     const EffectScene known = scene.forEffects(gl, *bricks);
+    const CameraView& view = scene.view();
+    known.set("forward", view.forward);
+    known.set("right", view.wide * view.right);
+    known.set("up", view.high * view.up);
+    known.set("isParallel", int(view.isParallel));
+    known.set("component", options.channel % int(kChannelsAGroup));
+    std::vector<std::array<float, 4>> clips;
+    for (const HalfSpace& half : options.within) clips.push_back(known.planeFromEye(half));
+    known.set("clipCount", int(clips.size()));
+    if (!clips.empty()) known.set("clips", clips);
+    known.set("slicesAVoxel", options.slicesAVoxel);
+    known.set("layersAWorldUnit", 1 / options.layerWorld);
+    const Vec3i& slots = pool.layout().slots;
+    gl.ProgramUniform3i(bricks->id(), bricks->uniform("slotsAlong"), slots.x, slots.y, slots.z);
     for (const Effect& effect : options.effects)
         if (effect.setUniforms) effect.setUniforms(known);
 }

@@ -5,8 +5,10 @@
 
 #include "render/effects/axes.h"
 #include "render/effects/bricks.h"
+#include "render/effects/cuts.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
+#include "render/effects/probes.h"
 #include "render/effects/scale_bar.h"
 #include "render/effects/shading.h"
 #include "scene/colour_maps.h"
@@ -117,17 +119,30 @@ SceneFunction readFunction(const JsonNode& json) {
     return function;
 }
 
+Box3d readBox(const JsonNode& json) {
+    const std::vector<double> b = json.numbers(6);
+    for (std::size_t a = 0; a < 3; ++a)
+        if (!(b[a] < b[a + 3])) json.fail("x0, y0, z0, x1, y1, z1, each first one below the second");
+    return {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}};
+}
+
+/// The keys "normal" and "offset" of a plane.
+HalfSpace readHalfSpace(const JsonNode& json) {
+    const Vec3d direction = readDirection(json.at("normal"));
+    const double offset = json.at("offset").number() / glm::length(json.at("normal").vector());
+    if (!std::isfinite(offset)) json.at("offset").fail("a number that isn't so large beside the normal");
+    return {direction, offset};
+}
+
 void readClip(const JsonNode& json, std::vector<HalfSpace>& within) {
     json.expectKeys({"box", "planes"});
     if (const auto box = json.find("box")) {
-        const std::vector<double> b = box->numbers(6);
+        const Box3d bounds = readBox(*box);
         for (int a = 0; a < 3; ++a) {
-            const double low = b[std::size_t(a)], high = b[std::size_t(a) + 3];
-            if (!(low < high)) box->fail("x0, y0, z0, x1, y1, z1, each first one below the second");
             Vec3d axis(0);
             axis[a] = 1;
-            within.push_back({axis, low});
-            within.push_back({-axis, -high});
+            within.push_back({axis, bounds.min[a]});
+            within.push_back({-axis, -bounds.max[a]});
         }
     }
     if (const auto planes = json.find("planes")) {
@@ -135,12 +150,7 @@ void readClip(const JsonNode& json, std::vector<HalfSpace>& within) {
         if (list.size() > kMostPlanes) planes->fail("at most 16 planes");
         for (const JsonNode& plane : list) {
             plane.expectKeys({"normal", "offset"});
-            const Vec3d normal = plane.at("normal").vector();
-            const Vec3d direction = readDirection(plane.at("normal"));
-            const double offset = plane.at("offset").number() / glm::length(normal);
-            if (!std::isfinite(offset))
-                plane.at("offset").fail("a number that isn't so large beside the normal");
-            within.push_back({direction, offset});
+            within.push_back(readHalfSpace(plane));
         }
     }
 }
@@ -191,6 +201,101 @@ Effect readBrickEdges(const JsonNode& json) {
     return brickEdgesEffect(edges);
 }
 
+Contours readContours(const JsonNode& json) {
+    json.expectKeys({"values", "count", "width", "color"});
+    refuseBoth(json, "count", "values");
+    Contours contours;
+    if (const auto values = json.find("values")) {
+        const std::string expected = "a list of 1 to 64 values";
+        for (const JsonNode& value : values->list(expected)) contours.values.push_back(value.number());
+        if (contours.values.empty() || contours.values.size() > 64) values->fail(expected);
+    }
+    if (const auto count = json.find("count")) contours.count = count->whole(1, 64);
+    if (const auto width = json.find("width")) contours.widthPixels = width->number(0.1, 100);
+    if (const auto color = json.find("color")) contours.color = readColour(*color);
+    return contours;
+}
+
+Effect readCuts(const JsonNode& json) {
+    json.expectKeys({"planes", "contours"});
+    Cuts cuts;
+    const std::string expected = "a list of 1 to 16 planes";
+    for (const JsonNode& node : json.at("planes").list(expected)) {
+        node.expectKeys({"normal", "offset", "opacity"});
+        cuts.planes.push_back({readHalfSpace(node), readShare(node, "opacity", 1)});
+    }
+    if (cuts.planes.empty() || cuts.planes.size() > 16) json.at("planes").fail(expected);
+    if (const auto contours = json.find("contours")) cuts.contours = readContours(*contours);
+    return cutsEffect(cuts);
+}
+
+std::vector<ProbeShape> readShapes(const JsonNode& json);
+
+ProbeShape readShape(const JsonNode& json) {
+    constexpr std::pair<const char*, ProbeShape::Kind> kKinds[] = {{"plane", ProbeShape::plane},
+                                                                   {"sphere", ProbeShape::ball},
+                                                                   {"box", ProbeShape::box},
+                                                                   {"union", ProbeShape::unite},
+                                                                   {"intersection", ProbeShape::intersect},
+                                                                   {"difference", ProbeShape::subtract}};
+    json.expectKeys({"plane", "sphere", "box", "union", "intersection", "difference"});
+    std::optional<ProbeShape> shape;
+    for (const auto& [key, kind] : kKinds) {
+        const auto node = json.find(key);
+        if (!node) continue;
+        if (shape) node->refuse("can't stand beside another shape");
+        shape.emplace().kind = kind;
+        switch (kind) {
+            case ProbeShape::plane:
+                node->expectKeys({"normal", "offset"});
+                shape->half = readHalfSpace(*node);
+                break;
+            case ProbeShape::ball:
+                node->expectKeys({"center", "radius"});
+                shape->centerWorld = node->at("center").vector();
+                shape->radiusWorld = node->at("radius").length();
+                break;
+            case ProbeShape::box:
+                shape->boxWorld = readBox(*node);
+                break;
+            default:
+                shape->parts = readShapes(*node);
+        }
+    }
+    if (!shape) json.fail("a plane, sphere, box, union, intersection or difference");
+    return *shape;
+}
+
+std::vector<ProbeShape> readShapes(const JsonNode& json) {
+    std::vector<ProbeShape> shapes;
+    for (const JsonNode& node : json.list("a list of shapes")) shapes.push_back(readShape(node));
+    if (shapes.empty()) json.fail("a list of shapes");
+    return shapes;
+}
+
+Effect readProbes(const JsonNode& json) {
+    json.expectKeys({"shapes", "keep", "opacity", "lit", "light"});
+    Probes probes;
+    probes.shape.kind = ProbeShape::unite;
+    probes.shape.parts = readShapes(json.at("shapes"));
+    if (const auto keep = json.find("keep")) {
+        const std::string side = keep->text();
+        if (side != "inside" && side != "outside") keep->fail("inside or outside");
+        probes.keepsInside = side == "inside";
+    }
+    probes.opacity = readShare(json, "opacity", probes.opacity);
+    if (const auto lit = json.find("lit")) probes.isLit = lit->flag();
+    if (const auto light = json.find("light")) {
+        if (!probes.isLit) light->refuse("needs lit to be true");
+        probes.towardsLight = readDirection(*light);
+    }
+    try {
+        return probesEffect(probes);
+    } catch (const InputError& error) {
+        json.at("shapes").refuse(error.what());
+    }
+}
+
 Effect readPreintegration(const JsonNode& json) {
     json.expectKeys({});
     return preintegrationEffect();
@@ -220,13 +325,16 @@ Effect readScaleBar(const JsonNode& json, const Scene& scene) {
 
 /// @param scene what is read already.
 std::vector<Effect> readEffects(const JsonNode& json, const Scene& scene) {
-    json.expectKeys({"axes", "bricks", "isosurfaces", "preintegration", "scale_bar", "shading"});
+    json.expectKeys(
+        {"axes", "bricks", "cuts", "isosurfaces", "preintegration", "probes", "scale_bar", "shading"});
     std::vector<Effect> effects;
     if (const auto axes = json.find("axes")) effects.push_back(readAxes(*axes, scene));
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
+    if (const auto cuts = json.find("cuts")) effects.push_back(readCuts(*cuts));
     if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
     if (const auto preintegration = json.find("preintegration"))
         effects.push_back(readPreintegration(*preintegration));
+    if (const auto probes = json.find("probes")) effects.push_back(readProbes(*probes));
     if (const auto bar = json.find("scale_bar")) effects.push_back(readScaleBar(*bar, scene));
     if (const auto shading = json.find("shading")) effects.push_back(readShading(*shading));
     return effects;

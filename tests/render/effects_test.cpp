@@ -13,8 +13,10 @@
 #include "refine/camera_view.h"
 #include "render/effects/axes.h"
 #include "render/effects/bricks.h"
+#include "render/effects/cuts.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
+#include "render/effects/probes.h"
 #include "render/effects/shading.h"
 #include "schedule/random_schedule.h"
 #include "tessera/error.h"
@@ -242,6 +244,176 @@ TEST(Preintegration, OfOneSliceAVoxelIsAsGoodAsManyWithoutIt) {
     }
 }
 
+/// Colours that are linear in the field's values.
+TransferFunction colours() {
+    return stops({{-0.5, {0, 1, 0.2}, 0}, {2, {1, 0, 0.7}, 0}});
+}
+
+TEST_F(Effects, ACutPlaneHasTheFieldsColourAndContoursOfOneWidth) {
+    options.function = colours();
+    options.camera.heightWorld = 0;
+    options.camera.widthPixels = options.camera.heightPixels = 192;
+    const HalfSpace half{{1, 0.5, 1.5}, 1.4};
+    const Contours contours{.values = {0.3, 0.6, 0.9}, .widthPixels = 3, .color = {0, 0, 0}};
+    const Cuts cuts{.planes = {{half, 0.75}}, .contours = contours};
+    options.effects = {cutsEffect(cuts)};
+    const RgbaImage image = pictured->draw(options);
+    keep("cut", "contours", image);
+    const CameraView view = viewOf(options.camera);
+    const auto placeOf = [&](const ViewRay& ray) {
+        return ray.originWorld + (half.offsetWorld - glm::dot(half.normalWorld, ray.originWorld)) /
+                                     glm::dot(half.normalWorld, ray.direction) * ray.direction;
+    };
+    double worst = 0;
+    int on = 0, off = 0, clear = 0;
+    for (int y = 1; y + 1 < image.height; ++y)
+        for (int x = 1; x + 1 < image.width; ++x) {
+            const Vec3d p = placeOf(view.rayOf(options.camera, x, y));
+            const double inside = std::min({p.x, p.y, p.z, 1 - p.x, 1 - p.y, 1 - p.z});
+            if (std::abs(inside) < 0.02) continue;
+            const Rgba& pixel = image.at(x, y);
+            if (inside < 0) {
+                ASSERT_EQ(pixel[3], 0);
+                ++clear;
+                continue;
+            }
+            worst = std::max(worst, std::abs(double(pixel[3]) - 0.75));
+            const auto valueAt = [&](int i, int j) {
+                return linear(placeOf(view.rayOf(options.camera, i, j)));
+            };
+            const double value = valueAt(x, y);
+            const double steep = 0.5 * std::hypot(valueAt(x + 1, y) - valueAt(x - 1, y),
+                                                  valueAt(x, y + 1) - valueAt(x, y - 1));
+            double apart = 1e9;  // pixels from the nearest line
+            for (const double line : contours.values) apart = std::min(apart, std::abs(value - line) / steep);
+            const std::array<double, 4> shown =
+                shownAs(between({-0.5, {0, 1, 0.2}, 1}, {2, {1, 0, 0.7}, 1}, value));
+            const bool isOn = apart<0.95, isOff = apart> 2.05;
+            on += isOn;
+            off += isOff;
+            for (std::size_t c = 0; c < 3; ++c)
+                if (isOn || isOff)
+                    worst = std::max(worst, std::abs(double(pixel[c]) - (isOff ? 0.75 * shown[c] : 0)));
+        }
+    EXPECT_LT(worst, 0.5 / 255) << "on bricks of all levels, and where they meet";
+    EXPECT_GT(on, 200);
+    EXPECT_GT(off, 2000);
+    EXPECT_GT(clear, 5000);
+    EXPECT_THROW(cutsEffect({}), InputError);
+    EXPECT_THROW(cutsEffect({.planes = std::vector<CutPlane>(17)}), InputError);
+}
+
+/// Whether a combination has a place, by its definition.
+bool holds(const ProbeShape& shape, const Vec3d& p) {
+    const auto has = [&](const ProbeShape& part) { return holds(part, p); };
+    switch (shape.kind) {
+        case ProbeShape::plane:
+            return glm::dot(shape.half.normalWorld, p) >= shape.half.offsetWorld;
+        case ProbeShape::ball:
+            return glm::distance(p, shape.centerWorld) < shape.radiusWorld;
+        case ProbeShape::box:
+            return glm::all(glm::greaterThanEqual(p, shape.boxWorld.min)) &&
+                   glm::all(glm::lessThan(p, shape.boxWorld.max));
+        case ProbeShape::unite:
+            return std::ranges::any_of(shape.parts, has);
+        case ProbeShape::intersect:
+            return std::ranges::all_of(shape.parts, has);
+        default:
+            return has(shape.parts[0]) && std::none_of(shape.parts.begin() + 1, shape.parts.end(), has);
+    }
+}
+
+std::vector<Probes> probes() {
+    const ProbeShape ball{.kind = ProbeShape::ball, .centerWorld = {0.6, 0.35, 0.6}, .radiusWorld = 0.4};
+    const ProbeShape box{.kind = ProbeShape::box, .boxWorld = {{0.3, -1, 0.5}, {0.8, 0.7, 2}}};
+    const ProbeShape plane{.half = {{1, -1, 0.2}, 0.1}};
+    const auto combined = [](ProbeShape::Kind kind, std::vector<ProbeShape> parts) {
+        return ProbeShape{.kind = kind, .parts = std::move(parts)};
+    };
+    return {{ball},
+            {box},
+            {plane},
+            {.shape = ball, .keepsInside = true},
+            {combined(ProbeShape::unite, {ball, box})},
+            {combined(ProbeShape::intersect, {box, ball, plane})},
+            {combined(ProbeShape::subtract, {box, ball})},
+            {.shape = combined(ProbeShape::subtract, {ball, plane, box}), .keepsInside = true},
+            {combined(ProbeShape::unite, {combined(ProbeShape::intersect, {ball, plane}),
+                                          combined(ProbeShape::subtract, {box, ball})})}};
+}
+
+TEST_F(Effects, ProbesTakeAwayWhatTheyHoldAndShowTheFieldWhereTheyCut) {
+    options.camera = lookAt({3, -2, 2.5}, Vec3d(0.5), 48, 30);
+    options.slicesAVoxel = 1;
+    const CameraView view = viewOf(options.camera);
+    constexpr int kSteps = 2000;
+    int cut = 0, thinned = 0;
+    for (Probes probe : probes()) {
+        probe.opacity = 0;
+        options.function = even(0.3);
+        options.effects = {probesEffect(probe)};
+        const RgbaImage volume = pictured->draw(options);
+        probe.opacity = 1;
+        options.function = colours();
+        options.effects = {probesEffect(probe)};
+        const RgbaImage surface = pictured->draw(options);
+        double worst = 0, worstColour = 0;
+        for (int y = 0; y < volume.height; ++y)
+            for (int x = 0; x < volume.width; ++x) {
+                const ViewRay ray = view.rayOf(options.camera, x, y);
+                double begin = 0, end = 1e9;
+                for (int a = 0; a < 3; ++a) {
+                    const double s = (0.001 - ray.originWorld[a]) / ray.direction[a],
+                                 t = (0.999 - ray.originWorld[a]) / ray.direction[a];
+                    begin = std::max(begin, std::min(s, t));
+                    end = std::min(end, std::max(s, t));
+                }
+                if (end - begin < 0.02) continue;
+                // By many small steps along the ray.
+                const double step = (end - begin) / kSteps;
+                const auto isKept = [&](double at) {
+                    return holds(probe.shape, ray.originWorld + at * ray.direction) == probe.keepsInside;
+                };
+                int kept = 0, changes = 0;
+                double firstCut = -1, leastApart = 1e9, lastCut = begin;
+                bool was = isKept(begin + 0.5 * step);
+                kept += was;
+                for (int i = 1; i < kSteps; ++i) {
+                    const bool is = isKept(begin + (i + 0.5) * step);
+                    kept += is;
+                    if (is != was) {
+                        const double at = begin + i * step;
+                        if (changes++ == 0) firstCut = at;
+                        leastApart = std::min(leastApart, at - lastCut);
+                        lastCut = at;
+                    }
+                    was = is;
+                }
+                leastApart = std::min(leastApart, end - lastCut);
+                if (changes > 0 && leastApart < 0.01)
+                    continue;  // two cuts by each other, or a ray beside one
+                const double opacity = 1 - std::pow(0.7, kept * step / options.layerWorld);
+                const double steps = 2 * (changes + 1) * step / options.layerWorld;
+                worst = std::max(worst, std::abs(double(volume.at(x, y)[3]) - opacity) - steps);
+                thinned += changes > 0;
+                if (changes == 0) continue;
+                ++cut;
+                const double value = linear(ray.originWorld + firstCut * ray.direction);
+                const auto shown = shownAs(between({-0.5, {0, 1, 0.2}, 1}, {2, {1, 0, 0.7}, 1}, value));
+                EXPECT_EQ(surface.at(x, y)[3], 1);
+                for (std::size_t c = 0; c < 3; ++c)
+                    worstColour = std::max(worstColour, std::abs(double(surface.at(x, y)[c]) - shown[c]));
+            }
+        EXPECT_LT(worst, 0.2 / 255);
+        EXPECT_LT(worstColour, 0.5 / 255);
+    }
+    EXPECT_GT(cut, 1500);
+    EXPECT_GT(thinned, 1500);
+    EXPECT_THROW(probesEffect({{.kind = ProbeShape::unite}}), InputError);
+    EXPECT_THROW(probesEffect({{.kind = ProbeShape::unite, .parts = std::vector<ProbeShape>(17)}}),
+                 InputError);
+}
+
 TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
     options.within.clear();
     options.function = even(0);
@@ -274,7 +446,12 @@ TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
 
 /// One of each.
 std::vector<Effect> everyEffect() {
-    return {axesEffect({}), brickEdgesEffect({}), isosurfacesEffect({{.value = 0.6}}), preintegrationEffect(),
+    return {axesEffect({}),
+            brickEdgesEffect({}),
+            cutsEffect({.planes = {{}}}),
+            isosurfacesEffect({{.value = 0.6}}),
+            preintegrationEffect(),
+            probesEffect({}),
             shadingEffect({})};
 }
 

@@ -52,8 +52,13 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
         "layer": 0.5, "background": [0, 0.5, 1],
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
         "length_unit": "mm",
-        "effects": {"axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {},
-                    "preintegration": {},
+        "effects": {"axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
+                    "cuts": {"planes": [{"normal": [0, 0, 2], "offset": 3, "opacity": 0.5}],
+                             "contours": {"values": [1, 2], "width": 2, "color": [1, 1, 1]}},
+                    "probes": {"shapes": [{"difference": [{"box": [0, 0, 0, 1, 1, 1]},
+                                                          {"sphere": {"center": [0, 0, 0], "radius": 1}}]},
+                                          {"plane": {"normal": [0, 1, 0], "offset": 0}}],
+                               "keep": "inside", "opacity": 0.5, "lit": true, "light": [1, 0, 0]},
                     "isosurfaces": {"surfaces": [{"value": 3}, {"value": 1, "color": [1, 0, 0], "opacity": 0.5}]}},
         "size": [640, 480], "samples": 9, "slices": 4, "legend": false, "unit": "m/s"})");
     EXPECT_EQ(scene.field, "V");
@@ -82,8 +87,8 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_EQ(scene.lengthUnit, "mm");
     std::vector<std::string> names;
     for (const Effect& effect : scene.effects) names.push_back(effect.name);
-    EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "isosurfaces", "preintegration", "scale_bar",
-                                               "shading"}));
+    EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "cuts", "isosurfaces", "preintegration",
+                                               "probes", "scale_bar", "shading"}));
     // Units are in what effects write.
     const LineView view{{{0, -9, 0}, {0, 1, 0}, {0, 0, 1}}, {Vec3d(-1), Vec3d(1)}};
     EXPECT_TRUE(linesOf(scene.effects, view).marks.words.back().text.ends_with(" mm"));
@@ -142,6 +147,22 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
         {R"({"version": 1, "length_unit": 1})", "length_unit: expected a text"},
         {R"({"version": 1, "effects": {"preintegration": {"table": 2}}})",
          "effects.preintegration: unknown key \"table\"; it knows none"},
+        {R"({"version": 1, "effects": {"cuts": {"planes": []}}})",
+         "effects.cuts.planes: expected a list of 1 to 16"},
+        {R"({"version": 1, "effects": {"cuts": {"planes": [{"normal": [0, 0, 0], "offset": 1}]}}})",
+         "effects.cuts.planes[0].normal: expected a direction"},
+        {R"({"version": 1, "effects": {"cuts": {"planes": [{"normal": [0, 0, 1], "offset": 1}],
+            "contours": {"values": [1], "count": 3}}}})",
+         "effects.cuts.contours.count: can't stand beside values"},
+        {R"({"version": 1, "effects": {"probes": {"shapes": [{}]}}})",
+         "effects.probes.shapes[0]: expected a plane, sphere, box"},
+        {R"({"version": 1, "effects": {"probes": {"shapes": [{"union": [{"sphere": {"center": [0, 0, 0]}}]}]}}})",
+         "effects.probes.shapes[0].union[0].sphere.radius: expected a number"},
+        {R"({"version": 1, "effects": {"probes": {"shapes": [{"box": [0, 0, 0, 1, 1, 1],
+            "plane": {"normal": [0, 0, 1], "offset": 1}}]}}})",
+         "effects.probes.shapes[0].box: can't stand beside another shape"},
+        {R"({"version": 1, "effects": {"probes": {"keep": "all", "shapes": [{"box": [0, 0, 0, 1, 1, 1]}]}}})",
+         "effects.probes.keep: expected inside or outside"},
         {R"({"version": 1, "effects": {"shading": {"ambient": 2}}})",
          "effects.shading.ambient: expected a number from 0 to 1"},
         {R"({"version": 1, "effects": {"shading": {"light": [0, 0, 0]}}})",

@@ -33,11 +33,9 @@ Effect isosurfacesEffect(std::vector<Isosurface> surfaces, const Vec3d& towardsL
                              float(surface.opacity)});
             codes.push_back(float(scene.coding.encode(surface.value)));
         }
-        const GLuint program = scene.program.id();
-        const auto count = GLsizei(surfaces.size());
-        scene.gl.ProgramUniform4fv(program, scene.program.uniform("isosurfaces"), count, shown[0].data());
-        scene.gl.ProgramUniform1fv(program, scene.program.uniform("isosurfaceCodes"), count, codes.data());
-        scene.gl.ProgramUniform1i(program, scene.program.uniform("isosurfaceCount"), count);
+        scene.set("isosurfaces", shown);
+        scene.set("isosurfaceCodes", codes);
+        scene.set("isosurfaceCount", int(surfaces.size()));
         scene.setDirection("isosurfaceLight", towardsLight);
     };
     return effect;

@@ -20,9 +20,9 @@ Effect shadingEffect(const Shading& shading) {
     effect.readsIndex = true;
     effect.setUniforms = [shading](const EffectScene& scene) {
         scene.setDirection("shadingLight", shading.towardsLight);
-        scene.gl.ProgramUniform4f(scene.program.id(), scene.program.uniform("shadingWeights"),
-                                  float(shading.ambient), float(shading.diffuse), float(shading.specular),
-                                  float(shading.shininess));
+        const std::array<float, 4> weights{float(shading.ambient), float(shading.diffuse),
+                                           float(shading.specular), float(shading.shininess)};
+        scene.set("shadingWeights", std::span(&weights, 1));
         const double codes = scene.coding.encode(scene.range.max) - scene.coding.encode(scene.range.min);
         scene.set("shadingEven", codes / (kEvenSizes * scene.sizeWorld));
     };

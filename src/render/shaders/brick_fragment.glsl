@@ -79,39 +79,40 @@ void main() {
 #if defined(SHEET) || defined(CLASSIFY)
     float codeLast = 0.0, sampledTo = -1.0;
 #endif
+    float partEnd = end;
 #ifdef SURFACE
-    // The next one, the first where the brick begins or behind it.
+    // The next one; the first may be where the brick begins.
     float surface = surfaceBehind(origin, direction, begin > 0.0 ? intBitsToFloat(floatBitsToInt(begin) - 1) : -1.0);
-    left += kMostSurfaces;
 #endif
-    for (; begin < end && left > 0; --left) {
-#ifdef LINES
-        comeTo(begin, line, before, isBehind, sum, light);
-#endif
-#ifdef SURFACE
-        if (surface == begin) {
-            if (cover >= 0.0) add(surfaceByEffects(from + begin * step, origin, direction, begin), sum, light);
-            if (light < kDark) break;
-            surface = surfaceBehind(origin, direction, begin);
-        }
-#endif
-        slab += 1.0;
-        float next = min((bricks[number].firstSlab + slab) / slabsALength, end);
-        if (left == 1) next = end;
 #if defined(SURFACE) || defined(LINES)
-        // What comes before a surface or a line is a slab of its own.
-        float cut = 1e38;
-#ifdef SURFACE
-        cut = surface;
-#endif
+    // Part by part, each from one surface or line to the next.
+    for (int parts = kMostSurfaces; begin < end && parts > 0 && light >= kDark; --parts) {
+    partEnd = end;
+    left += 4;
 #ifdef LINES
-        if (!isBehind) cut = min(cut, line);
+    comeTo(begin, line, before, isBehind, sum, light);
+    if (!isBehind) partEnd = min(partEnd, line);
 #endif
-        if (cut < next) {
-            next = cut;
-            slab -= 1.0;
-        }
+#ifdef SURFACE
+    if (surface == begin) {
+        if (cover >= 0.0) add(surfaceByEffects(from + begin * step, origin, direction, begin), sum, light);
+        surface = surfaceBehind(origin, direction, begin);
+    }
+    partEnd = min(partEnd, surface);
 #endif
+#ifdef HIDE
+    if (isHiddenByEffects(origin, direction, 0.5 * (begin + partEnd))) {
+        begin = partEnd;
+        slab = floor(begin * slabsALength - bricks[number].firstSlab);
+        cover = coverAt(from + begin * step);
+        continue;
+    }
+#endif
+#endif
+    for (; begin < partEnd && left > 0; --left) {
+        slab += 1.0;
+        float next = min((bricks[number].firstSlab + slab) / slabsALength, partEnd);
+        if (left == 1) next = partEnd;
         if (!(next > begin)) continue;
         // The part in the mesh, coverage being taken as linear in between.
         float coverNext = coverAt(from + next * step);
@@ -119,9 +120,6 @@ void main() {
         float first = cover < 0.0 ? crossing : begin, last = coverNext < 0.0 ? crossing : next;
         bool isInside = max(cover, coverNext) >= 0.0 && last > first;
         cover = coverNext;
-#ifdef HIDE
-        isInside = isInside && !isHiddenByEffects(origin, direction, 0.5 * (begin + next));
-#endif
         begin = next;
         if (!isInside) continue;
 #if defined(SHEET) || defined(CLASSIFY)
@@ -164,6 +162,10 @@ void main() {
 #endif
         if (light < kDark) break;
     }
+#if defined(SURFACE) || defined(LINES)
+    slab -= 1.0;  // a part ends within it
+    }
+#endif
 #ifdef LINES
     comeTo(end, line, before, isBehind, sum, light);
 #endif
