@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -130,6 +131,11 @@ bool JsonNode::flag() const {
 std::string JsonNode::text() const {
     if (!json_->is_string()) fail("a text");
     return json_->get<std::string>();
+}
+
+std::string JsonNode::filePath() const {
+    if (text().empty()) fail("the name of a file");
+    return (std::filesystem::path(*path_).parent_path() / text()).string();
 }
 
 std::vector<double> JsonNode::numbers(std::size_t count) const {

@@ -37,6 +37,8 @@ class JsonNode {
     int whole(int least, int most) const;
     bool flag() const;
     std::string text() const;
+    /// The path of a file; a relative one counts from the folder of the file that it stands in.
+    std::string filePath() const;
     std::vector<double> numbers(std::size_t count) const;
     Vec3d vector() const;
 

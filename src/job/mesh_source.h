@@ -34,6 +34,7 @@ class MeshSource : public PictureSource {
     const Box3d& boundsWorld() const override { return bounds_; }
     const ValueRange& range() const override { return range_; }
     std::vector<double> histogram(const std::array<double, 2>& range) const override;
+    const TetMesh* sourceMesh() const override { return &mesh_; }
     const BrickPool& pool() const override { return live_->pool(); }
     const BrickFrame& frame() const override { return live_->frame(); }
     std::span<const PlacedBrick> bricks() const override { return live_->bricks(); }

@@ -10,6 +10,7 @@
 #include "mesh/field_range.h"
 #include "pool/brick_pool.h"
 #include "render/placed_bricks.h"
+#include "tessera/mesh.h"
 #include "tessera/vec.h"
 #include "vdb/vdb_file.h"
 
@@ -50,6 +51,8 @@ class PictureSource {
     virtual const ValueRange& range() const = 0;
     /// Shares of the mesh's volume by value: bins of one width over a range.
     virtual std::vector<double> histogram(const std::array<double, 2>& range) const = 0;
+    /// What the bricks are made of; null where it isn't known.
+    virtual const TetMesh* sourceMesh() const { return nullptr; }
 
     // What is to be drawn, as it is now:
     virtual const BrickPool& pool() const = 0;

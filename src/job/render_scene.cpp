@@ -12,6 +12,7 @@
 #include "job/mesh_source.h"
 #include "job/output_paths.h"
 #include "job/scene_picture.h"
+#include "job/source_effects.h"
 #include "job/table_text.h"
 #include "job/vdb_source.h"
 #include "scene/scene_file.h"
@@ -116,7 +117,7 @@ RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job&
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
     const std::unique_ptr<PictureSource> source = openSource(request, scene, thread, job);
-    const ScenePicture asked = pictureOf(scene, *source, !isExr);
+    const ScenePicture asked = pictureOf(withEffectsOf(scene, *source, job), *source, !isExr);
     if (asked.lacksLegend)
         job.warn(
             fmt::format("a picture of {} x {} pixels has no room for a legend", scene.width, scene.height));

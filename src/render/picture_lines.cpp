@@ -79,7 +79,10 @@ ProjectedLines projectLines(std::span<const LineSegment> segments, std::span<con
             const Vec3d p = glm::mix(from, to, share);
             const double w = view.isParallel ? 1 : p.z;
             rayPlace = {float((p.x / w + 1) / 2 * wideRays), float((p.y / w + 1) / 2 * rays)};
-            const double deep = p.z - glm::dot(originWorld - camera.eyeWorld, view.forward);
+            double deep = p.z - glm::dot(originWorld - camera.eyeWorld, view.forward);
+            // Rays from an eye meet nothing behind it.
+            deep = view.isParallel ? deep - segment.nearerWorld
+                                   : std::max(deep - segment.nearerWorld, kNearest * size);
             depth = float(view.isParallel ? deep : 1 / deep);
             nearest = std::min(nearest, deep);
             farthest = std::max(farthest, deep);

@@ -17,12 +17,14 @@ struct LineSegment {
     MarkColor color{};
     double widthPixels = 1;
     bool isClipped = false;  ///< only what lies in RenderOptions::within is drawn
+    double nearerWorld = 0;  ///< it counts as so much nearer than it is
 };
 
 /// What an effect draws for a camera.
 struct LineView {
     Camera camera;
-    Box3d boundsWorld;  ///< of the data
+    Box3d boundsWorld{};              ///< of the data
+    double coarsestSpacingWorld = 0;  ///< of the bricks; 0: it isn't known yet
 };
 /// PictureMarks::dotPixels for a picture of that size.
 int dotPixelsOf(const Camera& camera);

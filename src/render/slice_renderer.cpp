@@ -548,7 +548,10 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     RenderCounts count;
     count.bricks = std::int64_t(seen.size());
     count.unseenBricks = std::int64_t(bricks.size() - seen.size());
-    const LineView lineView{options.camera, options.boundsWorld};
+    LineView lineView{options.camera, options.boundsWorld};
+    for (const PlacedBrick& brick : bricks)
+        lineView.coarsestSpacingWorld =
+            std::max(lineView.coarsestSpacingWorld, frame.spacingWorld(brick.key.depth));
     const ProjectedLines lines = projectLines(linesOf(options.effects, lineView).segments, options.within,
                                               options.camera, scene.eye(), side);
     const bool hasLines = !lines.lines.empty();

@@ -9,6 +9,7 @@
 
 #include "mesh/field_range.h"
 #include "render/effect.h"
+#include "render/effects/outline.h"
 #include "tessera/focus.h"
 #include "tessera/transfer_function.h"
 #include "tessera/vec.h"
@@ -53,6 +54,14 @@ struct SceneBricks {
     double pixelsAVoxel = 0;
 };
 
+/// Effects that need more than the scene has: those of that name are made with the source of pictures.
+inline constexpr const char* kOutline = "outline";
+
+struct SceneOutline {
+    std::string mesh;  ///< a file; empty: that of the source
+    Outline shown;
+};
+
 /// What a picture shows. Every default is such that a scene without a word makes a picture.
 struct Scene {
     std::string field;             ///< empty: the first
@@ -71,6 +80,7 @@ struct Scene {
     std::string unit;             ///< of the values, for the legend
     std::string lengthUnit;       ///< of places, for axes and the scale bar
     std::vector<Effect> effects;  ///< in the order in which they are applied
+    SceneOutline outline;         ///< for the effect of that name, which is still without lines
 };
 
 /// The camera of a scene. @param boundsWorld of what is to be in the picture. @param legendPixels that its

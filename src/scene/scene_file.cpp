@@ -323,15 +323,38 @@ Effect readScaleBar(const JsonNode& json, const Scene& scene) {
     return scaleBarEffect({color ? readColour(*color) : inkOn(scene.ground), scene.lengthUnit});
 }
 
+SceneOutline readOutline(const JsonNode& json, const Scene& scene) {
+    json.expectKeys({"mesh", "angle", "edges", "width", "color"});
+    SceneOutline outline;
+    if (const auto mesh = json.find("mesh")) outline.mesh = mesh->filePath();
+    if (const auto edges = json.find("edges")) {
+        const std::string which = edges->text();
+        if (which != "sharp" && which != "all") edges->fail("sharp or all");
+        if (which == "all") outline.shown.leastDegrees = 0;
+    }
+    if (const auto angle = json.find("angle")) {
+        if (outline.shown.leastDegrees == 0) angle->refuse("can't stand beside all edges");
+        outline.shown.leastDegrees = angle->number(1, 180);
+    }
+    outline.shown.widthPixels = readWidth(json, outline.shown.widthPixels);
+    const auto color = json.find("color");
+    outline.shown.color = color ? readColour(*color) : inkOn(scene.ground);
+    return outline;
+}
+
 /// @param scene what is read already.
-std::vector<Effect> readEffects(const JsonNode& json, const Scene& scene) {
-    json.expectKeys(
-        {"axes", "bricks", "cuts", "isosurfaces", "preintegration", "probes", "scale_bar", "shading"});
+std::vector<Effect> readEffects(const JsonNode& json, Scene& scene) {
+    json.expectKeys({"axes", "bricks", "cuts", "isosurfaces", "outline", "preintegration", "probes",
+                     "scale_bar", "shading"});
     std::vector<Effect> effects;
     if (const auto axes = json.find("axes")) effects.push_back(readAxes(*axes, scene));
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
     if (const auto cuts = json.find("cuts")) effects.push_back(readCuts(*cuts));
     if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
+    if (const auto outline = json.find("outline")) {
+        scene.outline = readOutline(*outline, scene);
+        effects.emplace_back().name = kOutline;
+    }
     if (const auto preintegration = json.find("preintegration"))
         effects.push_back(readPreintegration(*preintegration));
     if (const auto probes = json.find("probes")) effects.push_back(readProbes(*probes));

@@ -1212,6 +1212,19 @@ class Pictures(AppTest):
         report = self.render("--scene", path, "--without", "axes")
         self.assertEqual(report["draw_calls"], self.render("--scene", self.scene(legend=False))["draw_calls"])
 
+    def test_the_outline_is_that_of_a_mesh_that_the_scene_names(self):
+        self.render("--scene", self.scene(legend=False))
+        plain = self.pixels()
+        path = self.scene(legend=False, effects={"outline": {"mesh": os.path.basename(self.cube)}})
+        self.render("--scene", path)
+        self.assertNotEqual(self.pixels(), plain)
+        self.render("--scene", path, "--without", "outline")
+        self.assertEqual(self.pixels(), plain)
+        out = ("-o", "x.png")
+        self.reject(2, "missing.vtu", "render", self.vdb, *out, "--scene", self.scene(effects={"outline": {"mesh": "missing.vtu"}}))
+        self.reject(2, "scene.json effects.outline.mesh missing", "render", self.vdb, *out, "--scene", self.scene(effects={"outline": {}}))
+        self.succeed("render", self.cube, *out, "--scene", self.scene(effects={"outline": {}}, bricks={"resolution": 17, "cells": 8}))
+
     def test_a_picture_goes_to_standard_output(self):
         command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
         result = subprocess.run(command, capture_output=True, check=True, timeout=300)

@@ -5,10 +5,12 @@
 #include <limits>
 #include <set>
 
+#include "brick_test_meshes.h"
 #include "mesh/element_index.h"
 #include "mesh/geometry.h"
 #include "mesh/mesh_quality.h"
 #include "mesh/nearest_point.h"
+#include "mesh/shell_edges.h"
 #include "mesh_test_tools.h"
 #include "reference/random.h"
 
@@ -415,6 +417,27 @@ TEST(ElementIndex, LeavesOutElementsBetweenThePointsOfAGrid) {
     }
     EXPECT_LT(double(kept), 0.8 * double(all));
     EXPECT_LT(double(kept), 1.25 * double(needed));
+}
+
+TEST(ShellEdges, AreThoseOfTheBoundaryOrOfItsBends) {
+    const TetMesh cube = gridMesh({2, 3, 4}, Vec3d(0), Vec3d(1));
+    // Each side of so many squares, of two faces each; an edge has two faces.
+    EXPECT_EQ(shellEdges(cube, 0).size(), std::size_t(2 * (2 * 3 + 3 * 4 + 2 * 4) * 2 * 3 / 2));
+    const std::vector<ShellEdge> bends = shellEdges(cube, 89);
+    EXPECT_EQ(bends.size(), std::size_t(4 * (2 + 3 + 4)));
+    for (const ShellEdge& edge : bends) {
+        const Vec3d a = cube.points[std::size_t(edge[0])], b = cube.points[std::size_t(edge[1])];
+        int onSides = 0;
+        for (int axis = 0; axis < 3; ++axis) onSides += a[axis] == b[axis] && (a[axis] == 0 || a[axis] == 1);
+        EXPECT_EQ(onSides, 2);
+        EXPECT_LT(edge[0], edge[1]);
+    }
+    EXPECT_TRUE(shellEdges(cube, 91).empty());
+    // Two elements that share an edge alone: four faces meet there.
+    TetMesh touching;
+    touching.points = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}};
+    touching.tets = {{0, 1, 2, 3}, {0, 1, 4, 5}};
+    EXPECT_EQ(shellEdges(touching, 180), (std::vector<ShellEdge>{{0, 1}}));
 }
 
 }  // namespace

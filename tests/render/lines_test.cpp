@@ -11,6 +11,7 @@
 #include "brick_test_meshes.h"
 #include "pictured.h"
 #include "render/effects/axes.h"
+#include "render/effects/outline.h"
 #include "render/effects/scale_bar.h"
 
 namespace tessera {
@@ -151,6 +152,50 @@ TEST_F(Lines, ThatCrossShowTheNearerOne) {
     const RgbaImage cut = pictured->draw(options);
     EXPECT_EQ(cut.at(m + 6, m)[3], 1);
     EXPECT_EQ(cut.at(m - 6, m)[3], 0);
+}
+
+TEST_F(Lines, MayCountAsNearer) {
+    options.function = even(1);
+    options.camera = {{0.5, -2, 0.5}, {0, 1, 0}, {0, 0, 1}, 35, 33, 33};
+    LineSegment line{{-0.5, 0.1, 0.5}, {1.5, 0.1, 0.5}, {0, 0, 1}, 5};
+    const auto blueInTheMiddle = [&] {
+        options.effects = {linesEffect({line})};
+        return pictured->draw(options).at(16, 16)[2];
+    };
+    // The volume's blue is a quarter.
+    EXPECT_NEAR(blueInTheMiddle(), 0.25, 1e-6);
+    line.nearerWorld = 0.11;
+    EXPECT_NEAR(blueInTheMiddle(), 1, 1e-6);
+    options.camera.heightWorld = 1.5;
+    EXPECT_NEAR(blueInTheMiddle(), 1, 1e-6);
+    line.nearerWorld = 0.09;
+    EXPECT_NEAR(blueInTheMiddle(), 0.25, 1e-6);
+}
+
+TEST_F(Lines, OfAnOutlineStandWhereTheMeshBends) {
+    options.function = even(0);
+    options.camera.widthPixels = options.camera.heightPixels = 192;
+    options.effects = {outlineEffect(pictured->mesh, {.widthPixels = 3, .color = {1, 0, 0}})};
+    const RgbaImage image = pictured->draw(options);
+    const CameraView view = viewOf(options.camera);
+    const auto redAt = [&](const Vec3d& p) {
+        const Vec3d d = p - options.camera.eyeWorld;
+        const double away = glm::dot(d, view.forward);
+        return image.at(int(96 * (1 + glm::dot(d, view.right) / away / view.wide)),
+                        int(96 * (1 - glm::dot(d, view.up) / away / view.high)))[0];
+    };
+    for (double t = 0.05; t < 1; t += 0.05)
+        for (int n = 0; n < 12; ++n) {
+            Vec3d p(t, n % 2, n / 2 % 2);
+            for (int turn = n / 4; turn > 0; --turn) p = Vec3d(p.z, p.x, p.y);
+            EXPECT_GT(redAt(p), 0.99f) << p.x << " " << p.y << " " << p.z;
+        }
+    const auto redPixels = [](const RgbaImage& of) {
+        return std::ranges::count_if(of.pixels, [](const Rgba& pixel) { return pixel[0] > 0; });
+    };
+    options.effects = {
+        outlineEffect(pictured->mesh, {.widthPixels = 3, .color = {1, 0, 0}, .leastDegrees = 0})};
+    EXPECT_LT(2 * redPixels(image), redPixels(pictured->draw(options))) << "sides have edges too";
 }
 
 TEST_F(Lines, OfAPictureInPartsAreThoseOfItsRays) {
