@@ -7,6 +7,7 @@ packages=(
   libvtk9-dev libopenvdb-dev libnanovdb-dev libopenvdb-tools libopenexr-dev openexr libtbb-dev libblosc-dev libpng-dev zlib1g-dev
   libglm-dev libgmp-dev libhwy-dev libcli11-dev nlohmann-json3-dev libfmt-dev libmimalloc-dev
   libgl-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6
+  libglfw3-dev libimgui-dev libstb-dev xvfb openbox xdotool
   libgtest-dev libbenchmark-dev clang-format tetgen
   python3 python3-vtk9 python3-openvdb python3-numpy python3-jsonschema
 )

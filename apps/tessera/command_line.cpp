@@ -620,6 +620,13 @@ void addCommand(CLI::App& app, CommandLine& line, const char* name, const char* 
     command.callback([&line, arguments, run] { line.run = [arguments, run] { return run(*arguments); }; });
 }
 
+/// What follows is read by the program that has the window.
+void addViewOptions(CLI::App& command, ViewArguments& a) {
+    command.set_help_flag();
+    command.prefix_command();
+    command.add_option("words", a.words)->group("");
+}
+
 void describe(CLI::App& app, CommandLine& line) {
     app.name("tessera");
     app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
@@ -643,6 +650,7 @@ void describe(CLI::App& app, CommandLine& line) {
                runPicture);
     addCommand(app, line, "render", "draw the volume of a .vdb file or a mesh: a .png or .exr",
                addRenderOptions, runRender);
+    addCommand(app, line, "view", "show a mesh or a .vdb file in a window", addViewOptions, runView);
     addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
                addCompareOptions, runCompare);
     addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",

@@ -1,6 +1,11 @@
 #include "commands.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
 
 #include "job/resample_files.h"
 #include "session.h"
@@ -82,6 +87,21 @@ int runRender(const RenderArguments& a) {
     Session session(a.common, request.output);
     session.writeReport(renderedJson(request, renderScene(request, session.job)));
     return 0;
+}
+
+// A program of its own, so that this one needs no display's libraries.
+int runView(const ViewArguments& a) {
+    std::error_code error;
+    const std::filesystem::path self = std::filesystem::canonical(programPath(), error);
+    const std::string program = (self.parent_path() / "tessera-view").string();
+    std::vector<std::string> words{program, "--reader", self.string()};
+    words.insert(words.end(), a.words.begin(), a.words.end());
+    std::vector<char*> pointers;
+    for (std::string& word : words) pointers.push_back(word.data());
+    pointers.push_back(nullptr);
+    ::execv(program.c_str(), pointers.data());
+    throw IoError(
+        fmt::format("{}: the program with the window can't be started: {}", program, std::strerror(errno)));
 }
 
 int runSlice(const SliceArguments& a) {

@@ -41,6 +41,10 @@ struct RenderArguments {
     std::string size, gl;
     RenderRequest request;
 };
+/// Words for the program that has the window.
+struct ViewArguments {
+    std::vector<std::string> words;
+};
 struct SliceArguments {
     CommonOptions common;
     RepairArguments repair;
@@ -77,6 +81,7 @@ int runPicture(const PictureArguments& arguments);
 int runRender(const RenderArguments& arguments);
 int runCompare(const CompareArguments& arguments);
 int runPaperTables(const PaperTablesArguments& arguments);
+int runView(const ViewArguments& arguments);
 int runSlice(const SliceArguments& arguments);
 int runFocusTrace(const FocusTraceArguments& arguments);
 

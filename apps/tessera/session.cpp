@@ -50,6 +50,10 @@ void noteStart() {
     if (::access(program.c_str(), X_OK) != 0 && name) program = std::filesystem::absolute(name, error);
 }
 
+const std::string& programPath() {
+    return program;
+}
+
 Session::Session(const CommonOptions& options, const std::string& output)
     : progress_(!options.quiet),
       strict_(options.strict),

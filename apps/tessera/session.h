@@ -14,6 +14,9 @@ inline constexpr const char* kReadMeshCommand = "read-mesh";
 /// To be called first in main: what is known of the process before it does anything.
 void noteStart();
 
+/// This program's own file.
+const std::string& programPath();
+
 /// Prints to standard output at once; what goes wrong is kept.
 void printOut(const std::string& text);
 /// errno of the first thing that couldn't be printed; 0 as long as all could.

@@ -74,6 +74,23 @@ class GlThread {
         return future;
     }
 
+    /// Deletes an object with handles on the OpenGL thread, and waits. Of a device that is lost nothing more
+    /// is to be learnt: what OpenGL says meanwhile is dropped.
+    template <class Object>
+    void dispose(Object* object) noexcept {
+        if (isThisThread()) {
+            delete object;
+            return;
+        }
+        try {
+            run([object](GlContext& context) {
+                delete object;
+                context.discardFailures();
+            });
+        } catch (...) {  // it is deleted all the same
+        }
+    }
+
     GlPlatform platform() const { return info_.platform; }
     const GlDeviceInfo& info() const { return info_; }
     bool isThisThread() const { return std::this_thread::get_id() == thread_.get_id(); }

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "job/field_selection.h"
+#include "job/focus_error.h"
 #include "mesh/geometry.h"
 #include "refine/plan_frame.h"
 #include "tessera/error.h"
@@ -40,6 +41,12 @@ MeshSource::MeshSource(const TetMesh& mesh, const Scene& scene, int threads, GlT
     const FieldSelection selection = selectFields(mesh, choices);
     if (selection.fields.empty()) throw InputError("the mesh has no field");
     const OutputField& output = selection.outputs[0];
+    for (const Field& field : mesh.fields) {
+        const bool isSecond =
+            field.location == FieldLocation::cell &&
+            mesh.fields[std::size_t(mesh.findField(field.name))].location == FieldLocation::point;
+        fieldsThere_.push_back({(isSecond ? "cell:" : "") + field.name, field.components});
+    }
     title_ = titleOf(output, scene.component);
     mesh_.fields.push_back(
         scalarOf(mesh.fields[std::size_t(selection.fields[0])], scene.component, execution));
@@ -62,9 +69,15 @@ bool MeshSource::setFocus(const Scene& scene) {
         focusOf(scene.bricks, bounds_, cameraOf(scene, bounds_, 0), frame.spacingWorld(frame.maxDepth)));
 }
 
+std::optional<PictureSource::Samples> MeshSource::samplesAt(const Vec3d& placeWorld) const {
+    const BrickScheduler& scheduler = live_->scheduler();
+    const auto leaf = scheduler.tree().findCovering(finestBrickAt(scheduler.frame(), placeWorld));
+    if (!leaf) return std::nullopt;
+    return Samples{leaf->key, scheduler.samples(leaf->key)};
+}
+
 // The mean of an element's values stands for its volume.
-std::vector<double> MeshSource::histogram(const std::array<double, 2>& range) const {
-    ValueHistogram histogram(range);
+void MeshSource::fill(ValueHistogram& histogram) const {
     const Field& field = mesh_.fields[0];
     for (std::size_t e = 0; e < mesh_.tets.size(); ++e) {
         double value = 0;
@@ -76,7 +89,6 @@ std::vector<double> MeshSource::histogram(const std::array<double, 2>& range) co
         const auto corner = [&](std::size_t c) { return mesh_.points[std::size_t(tet[c])]; };
         histogram.add(value, std::abs(sixfoldVolume(corner(0), corner(1), corner(2), corner(3)).value));
     }
-    return histogram.shares();
 }
 
 }  // namespace tessera

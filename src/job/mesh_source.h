@@ -33,14 +33,19 @@ class MeshSource : public PictureSource {
     const std::string& title() const override { return title_; }
     const Box3d& boundsWorld() const override { return bounds_; }
     const ValueRange& range() const override { return range_; }
-    std::vector<double> histogram(const std::array<double, 2>& range) const override;
     const TetMesh* sourceMesh() const override { return &mesh_; }
+    const std::vector<PictureField>& fields() const override { return fieldsThere_; }
     const BrickPool& pool() const override { return live_->pool(); }
     const BrickFrame& frame() const override { return live_->frame(); }
     std::span<const PlacedBrick> bricks() const override { return live_->bricks(); }
+    std::optional<Samples> samplesAt(const Vec3d& placeWorld) const override;
+    void moveTo(GlThread& thread) override { live_->moveTo(thread); }
 
   private:
+    void fill(ValueHistogram& histogram) const override;
+
     TetMesh mesh_;  // with the one field that is shown
+    std::vector<PictureField> fieldsThere_;
     std::string title_;
     Box3d bounds_;
     ValueRange range_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "gl/gl_thread.h"
 #include "mesh/field_range.h"
 #include "pool/brick_pool.h"
 #include "render/placed_bricks.h"
@@ -38,6 +39,12 @@ class ValueHistogram {
 /// Throws InputError for a component that there isn't.
 std::string titleOf(const OutputField& field, std::optional<int> component);
 
+/// A field that pictures may show.
+struct PictureField {
+    std::string name;  ///< as scenes write it
+    int components = 1;
+};
+
 /// What pictures are drawn of: the bricks of one field in a pool of an OpenGL device.
 class PictureSource {
   public:
@@ -50,7 +57,10 @@ class PictureSource {
     /// Of the finite values, of which there are some.
     virtual const ValueRange& range() const = 0;
     /// Shares of the mesh's volume by value: bins of one width over a range.
-    virtual std::vector<double> histogram(const std::array<double, 2>& range) const = 0;
+    const std::vector<double>& histogram(const std::array<double, 2>& range) const;
+
+    /// All that the file has.
+    virtual const std::vector<PictureField>& fields() const = 0;
     /// What the bricks are made of; null where it isn't known.
     virtual const TetMesh* sourceMesh() const { return nullptr; }
 
@@ -59,6 +69,30 @@ class PictureSource {
     virtual const BrickFrame& frame() const = 0;
     /// What pool().state() shows.
     virtual std::span<const PlacedBrick> bricks() const = 0;
+
+    /// A brick's samples, over its closed box.
+    struct Samples {
+        DepthKey key;
+        std::shared_ptr<const Block> block;
+    };
+    /// Of the brick that holds a place; none outside of all.
+    virtual std::optional<Samples> samplesAt(const Vec3d& placeWorld) const = 0;
+    /// The value at a place, interpolated; none outside the mesh.
+    std::optional<double> valueAt(const Vec3d& placeWorld) const;
+
+    /// Another device takes the place of the one before, which may be lost. Throws GlError.
+    virtual void moveTo(GlThread& thread) = 0;
+
+  private:
+    /// Adds all there is.
+    virtual void fill(ValueHistogram& histogram) const = 0;
+
+    /// The last one: every picture asks for it.
+    struct Histogram {
+        std::array<double, 2> range;
+        std::vector<double> shares;
+    };
+    mutable std::optional<Histogram> histogram_;
 };
 
 }  // namespace tessera

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 #include <utility>
 
 #include "base/parallel.h"
@@ -53,25 +54,27 @@ class ShownChannel {
     int only_ = -1;
 };
 
-BrickPool makePool(GlThread& thread, const BrickTree& tree, const ValueRange& range) {
+BrickPool makePool(GlThread& thread, std::size_t bricks, int brickCells, const ValueRange& range) {
     TexelCoding coding({ValueCoding(range, SampleFormat::r32f)}, SampleFormat::r32f);
-    const std::int64_t edge = tree.brickCells() + 1;
+    const std::int64_t edge = brickCells + 1;
     PoolOptions options;
-    options.budgetBytes = std::int64_t(tree.leafCount()) * edge * edge * edge * coding.pointBytes();
+    options.budgetBytes = std::int64_t(bricks) * edge * edge * edge * coding.pointBytes();
     // A little more, as atlases aren't of every size.
     options.budgetBytes += options.budgetBytes / 8 + 64 * edge * edge * edge * coding.pointBytes();
-    return {thread, tree.brickCells(), std::move(coding), options};
+    return {thread, brickCells, std::move(coding), options};
 }
 
 class VdbSource : public PictureSource {
   public:
     VdbSource(VdbFile file, const OutputField& field, std::optional<int> component, GlThread& thread,
               Job& job)
-        : title_(titleOf(field, component)),
+        : threads_(job.execution.threads),
+          title_(titleOf(field, component)),
           bounds_(coveredBounds(file)),
           frame_{file.tree.originWorld(),
                  file.tree.spacingWorld(levelOf(Depth(0), Depth(file.tree.levelCount() - 1))),
                  file.tree.brickCells()} {
+        for (const OutputField& there : file.fields) fields_.push_back({there.name, there.components});
         if (bounds_.empty()) throw InputError("no voxel lies in the mesh: nothing to draw");
         const ShownChannel channel(field, component);
         StoredBricks stored =
@@ -92,38 +95,62 @@ class VdbSource : public PictureSource {
         // What lies beyond the layers of an extension isn't read.
         if (file.layers == 0)
             for (const std::string& note : stored.notes) job.say(note + "\n");
-        pool_.emplace(makePool(thread, file.tree, range_));
-        PoolTarget target(*pool_, job.execution.threads);
-        target.publish({.removed = {}, .added = stored.bricks});
-        if (target.isBehind()) target.catchUp();
-        placed_ = placeBricks(target, 0);
         stored_ = std::move(stored.bricks);
+        for (std::size_t i = 0; i < stored_.size(); ++i) {
+            const DepthKey& key = stored_[i].leaf.key;
+            places_.emplace(key, i);
+            deepest_ = std::max(deepest_, key.depth.halvings());
+        }
+        fillPool(thread);
     }
 
     const std::string& title() const override { return title_; }
     const Box3d& boundsWorld() const override { return bounds_; }
     const ValueRange& range() const override { return range_; }
+    const std::vector<PictureField>& fields() const override { return fields_; }
     const BrickPool& pool() const override { return *pool_; }
     const BrickFrame& frame() const override { return frame_; }
     std::span<const PlacedBrick> bricks() const override { return placed_; }
 
+    std::optional<Samples> samplesAt(const Vec3d& placeWorld) const override {
+        for (int depth = 0; depth <= deepest_; ++depth) {
+            const double edge = frame_.spacingWorld(Depth(depth)) * frame_.cells;
+            const DepthKey key{Depth(depth), Vec3i(glm::floor((placeWorld - frame_.originWorld) / edge))};
+            if (const auto at = places_.find(key); at != places_.end())
+                return Samples{key, stored_[at->second].samples};
+        }
+        return std::nullopt;
+    }
+    void moveTo(GlThread& thread) override { fillPool(thread); }
+
+  private:
     // Samples of coarse bricks stand for more of the volume.
-    std::vector<double> histogram(const std::array<double, 2>& range) const override {
-        ValueHistogram histogram(range);
+    void fill(ValueHistogram& histogram) const override {
         for (const ShownBrick& brick : stored_) {
             const double volume = std::ldexp(1.0, -3 * brick.leaf.key.depth.halvings());
             for (std::size_t p = 0; p < brick.samples->count(); ++p)
                 if (brick.samples->coverage[p] != 0) histogram.add(double(brick.samples->values[p]), volume);
         }
-        return histogram.shares();
     }
 
-  private:
+    void fillPool(GlThread& thread) {
+        pool_.reset();
+        pool_.emplace(makePool(thread, stored_.size(), frame_.cells, range_));
+        PoolTarget target(*pool_, threads_);
+        target.publish({.removed = {}, .added = stored_});
+        if (target.isBehind()) target.catchUp();
+        placed_ = placeBricks(target, 0);
+    }
+
+    int threads_;
+    std::vector<PictureField> fields_;
     std::string title_;
     Box3d bounds_;
     BrickFrame frame_;
     ValueRange range_;
     std::vector<ShownBrick> stored_;
+    std::unordered_map<DepthKey, std::size_t, DepthKeyHash> places_;  // in stored_
+    int deepest_ = 0;
     std::vector<PlacedBrick> placed_;
     std::optional<BrickPool> pool_;
 };

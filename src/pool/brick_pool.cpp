@@ -132,12 +132,7 @@ BrickPool::BrickPool(GlThread& thread, int brickCells, TexelCoding coding, const
     for (std::size_t group = 0; group < coding_.groupCount(); ++group)
         largest = std::max(largest, coding_.texelBytes(group));
     layout_ = chooseSlotLayout(brickCells + 1, coding_.pointBytes(), largest, options.budgetBytes, limits);
-    device_ = std::shared_ptr<Device>(new Device, [&thread](Device* d) {
-        if (thread.isThisThread())
-            delete d;
-        else
-            thread.run([d](GlContext&) { delete d; });
-    });
+    device_ = std::shared_ptr<Device>(new Device, [&thread](Device* device) { thread.dispose(device); });
     device_->thread = &thread;
     const std::int64_t slotTexels = std::int64_t(layout_.edge) * layout_.edge * layout_.edge;
     const std::int64_t layerBytes = slotTexels * layout_.slots.x * layout_.slots.y * coding_.pointBytes();

@@ -19,8 +19,10 @@ struct CameraView {
     bool isParallel = false;
 
     /// Through the middle of a pixel counted from the top left.
-    ViewRay rayOf(const Camera& camera, int x, int y) const {
-        const double u = (2.0 * x + 1) / camera.widthPixels - 1, v = 1 - (2.0 * y + 1) / camera.heightPixels;
+    ViewRay rayOf(const Camera& camera, int x, int y) const { return rayOf(camera, x + 0.5, y + 0.5); }
+    /// Through a place of the picture in pixels from the top left.
+    ViewRay rayOf(const Camera& camera, double x, double y) const {
+        const double u = 2 * x / camera.widthPixels - 1, v = 1 - 2 * y / camera.heightPixels;
         const Vec3d across = u * wide * right + v * high * up;
         if (isParallel) return {camera.eyeWorld + across, forward};
         return {camera.eyeWorld, glm::normalize(forward + across)};

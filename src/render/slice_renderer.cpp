@@ -20,7 +20,7 @@ namespace tessera {
 namespace {
 
 /// Rays along an edge of what is drawn at once.
-constexpr int kTile = 1024;
+constexpr int kTile = 1024, kLeastTile = 64;
 constexpr std::size_t kMostClips = 32;
 /// Pixels are closed after so many parts of the bricks.
 constexpr std::size_t kParts = 12;
@@ -518,12 +518,7 @@ void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std:
 }
 
 SliceRenderer::SliceRenderer(GlThread& thread)
-    : thread_(thread), device_(new Device, [&thread](Device* device) {
-          if (thread.isThisThread())
-              delete device;
-          else
-              thread.run([device](GlContext&) { delete device; });
-      }) {}
+    : thread_(thread), device_(new Device, [&thread](Device* device) { thread.dispose(device); }) {}
 
 SliceRenderer::~SliceRenderer() = default;
 
@@ -560,7 +555,7 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
         return image;
     }
 
-    const int pixelsATile = kTile / side;
+    const int pixelsATile = std::clamp(options.raysATile, kLeastTile, kTile) / side;
     const Vec3i picture(image.width * side, image.height * side, 1);
     const std::size_t group = std::size_t(options.channel) / kChannelsAGroup;
     std::vector<Rgba> rays;
@@ -568,8 +563,8 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     struct Uploaded {
         GlBuffer bricks, stops;
     };
-    const std::shared_ptr<Uploaded> uploaded(
-        new Uploaded, [this](Uploaded* buffers) { thread_.run([buffers](GlContext&) { delete buffers; }); });
+    const std::shared_ptr<Uploaded> uploaded(new Uploaded,
+                                             [this](Uploaded* buffers) { thread_.dispose(buffers); });
     thread_.run([&](GlContext& context) {
         device_->prepare(context, pool.brickCells(), options.effects, hasLines);
         if (hasLines) device_->lines->take(context, lines, scene.view(), scene.raySize());
@@ -581,6 +576,7 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     });
     for (int top = 0; top < image.height; top += pixelsATile)
         for (int left = 0; left < image.width; left += pixelsATile) {
+            if (options.beforeTile) options.beforeTile();
             execution.throwIfCancelled();
             const int wide = std::min(pixelsATile, image.width - left);
             const int high = std::min(pixelsATile, image.height - top);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -34,6 +35,10 @@ struct RenderOptions {
     std::vector<Effect> effects;
     /// What of the pool is data, for effects that show its extent.
     Box3d boundsWorld{};
+    /// Rays along an edge of what is drawn at once, 64 to 1024; a picture is cancelled between such parts.
+    int raysATile = 1024;
+    /// Called before each part; may be null.
+    std::function<void()> beforeTile = nullptr;
 };
 
 struct RenderCounts {

@@ -393,7 +393,7 @@ Scene readScene(const std::string& path) {
 Scene sceneFrom(const JsonNode& json) {
     json.expectKeys({"$schema", "version", "field", "component", "camera", "transfer_function", "layer",
                      "background", "bricks", "clip", "size", "samples", "slices", "legend", "unit",
-                     "length_unit", "effects"});
+                     "length_unit", "effects", "bookmarks"});
     if (json.at("version").number() != kVersion) json.at("version").fail("1, the version of this format");
     Scene scene;
     if (const auto field = json.find("field")) scene.field = field->text();
@@ -417,6 +417,13 @@ Scene sceneFrom(const JsonNode& json) {
     }
     if (const auto slices = json.find("slices")) scene.slicesAVoxel = slices->number(0.125, 64);
     if (const auto legend = json.find("legend")) scene.hasLegend = legend->flag();
+    // A viewer's; pictures don't look at them.
+    if (const auto bookmarks = json.find("bookmarks"))
+        for (const JsonNode& bookmark : bookmarks->list("a list of views")) {
+            bookmark.expectKeys({"name", "camera"});
+            bookmark.at("name").text();
+            readCamera(bookmark.at("camera"));
+        }
     if (const auto unit = json.find("unit")) scene.unit = unit->text();
     if (const auto unit = json.find("length_unit")) scene.lengthUnit = unit->text();
     if (const auto effects = json.find("effects")) scene.effects = readEffects(*effects, scene);

@@ -1,0 +1,71 @@
+#include "view/scene_document.h"
+
+#include <utility>
+
+#include "files/atomic_file.h"
+#include "files/input_file.h"
+#include "scene/scene_file.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::size_t kMostSteps = 200;
+
+}  // namespace
+
+SceneDocument::SceneDocument() {
+    take({{"version", 1}});
+    steps_ = {json_};
+}
+
+SceneDocument SceneDocument::read(const std::string& path) {
+    readScene(path);  // strictly, with the file's name in what it says
+    SceneDocument document;
+    document.take(Json::parse(readWholeFile(path)));
+    document.steps_ = {document.json_};
+    return document;
+}
+
+void SceneDocument::take(Json json) {
+    scene_ = sceneFrom(JsonNode::of(nlohmann::json(json), "the scene"));
+    json_ = std::move(json);
+    ++revision_;
+}
+
+void SceneDocument::change(Json json, bool isStep) {
+    if (json == json_) return;
+    take(std::move(json));
+    if (isStep) {
+        steps_.resize(at_ + 1);
+        if (steps_.size() == kMostSteps) steps_.erase(steps_.begin());
+        steps_.push_back(json_);
+        at_ = steps_.size() - 1;
+    } else {
+        steps_.resize(at_ + 1);
+        steps_[at_] = json_;
+    }
+}
+
+void SceneDocument::drag(Json json) {
+    if (json == json_) return;
+    change(std::move(json), !std::exchange(isDragged_, true));
+}
+
+void SceneDocument::undo() {
+    if (!canUndo()) return;
+    endDrag();
+    take(steps_[--at_]);
+}
+
+void SceneDocument::redo() {
+    if (!canRedo()) return;
+    endDrag();
+    take(steps_[++at_]);
+}
+
+void SceneDocument::save(const std::string& path) const {
+    writeFileAtomically(path, json_.dump(2) + "\n");
+}
+
+}  // namespace tessera

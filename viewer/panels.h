@@ -1,0 +1,35 @@
+#pragma once
+
+#include <deque>
+#include <string>
+
+#include "view/view_session.h"
+
+namespace tessera {
+
+/// What the panels remember beside the scene.
+struct PanelState {
+    bool isOpen = true, showsHelp = false, isLight = false;
+    std::string scenePath, picturePath;
+    std::string newBookmark;
+    std::deque<std::string> messages;  ///< shown until they are read
+    double frameMs = 0, frameScale = 1;
+    std::string underCursor;
+};
+
+/// The panel on the left. Returns whether something of it is being dragged.
+bool drawPanel(ViewSession& session, PanelState& state, float widthPixels, float heightPixels);
+/// A line with what is going on.
+void drawStatus(const ViewSession& session, const PanelState& state, float left, float top, float width,
+                float height);
+void drawHelp(PanelState& state);
+
+// What keys do too; what goes wrong is a message.
+void saveScene(ViewSession& session, PanelState& state);
+void savePicture(ViewSession& session, PanelState& state);
+void addBookmark(ViewSession& session, PanelState& state);
+void setFocus(ViewSession& session, const Vec3d& placeWorld);
+/// Turns an effect on or off.
+void toggleEffect(ViewSession& session, const std::string& name);
+
+}  // namespace tessera

@@ -1,0 +1,440 @@
+#include "window.h"
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <fmt/format.h>
+#include <imgui.h>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "gl/gl_functions.h"
+#include "panels.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = SceneDocument::Json;
+
+constexpr float kPanelWidth = 340, kStatusHeight = 26;
+/// The interface is drawn so often at least while bricks are sampled.
+constexpr double kIdleMs = 120;
+constexpr double kFlyASecond = 0.8;
+constexpr float kHandleReach = 9;
+/// A device that is lost more often than that isn't tried again.
+constexpr int kMostRecoveries = 3;
+constexpr std::chrono::seconds kRecoveriesWithin{10};
+
+std::string lastError;
+
+double msSince(Clock::time_point then) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - then).count();
+}
+
+}  // namespace
+
+// What GLFW and OpenGL have of the window.
+struct Window::Screen {
+    GLFWwindow* window = nullptr;
+    GlFunctions gl;
+    GLuint texture = 0;
+    int textureWidth = 0, textureHeight = 0;
+    PanelState state;
+
+    int buttonsDown = 0;
+    std::size_t inputs = 0;  ///< those that a picture at rest gives way to
+    std::vector<std::string> dropped;
+    std::optional<std::array<double, 2>> lastMouse;
+    bool isDragging = false;
+    int handle = -1;  ///< clip plane that is dragged
+    std::vector<Clock::time_point> recoveries;
+    bool hasFailed = false;
+
+    static Screen& of(GLFWwindow* window) { return *static_cast<Screen*>(glfwGetWindowUserPointer(window)); }
+    float panelWidth() const { return state.isOpen ? kPanelWidth * scale : 0; }
+    float scale = 1;
+
+    ~Screen() {
+        if (window) {
+            ImGui_ImplOpenGL3_Shutdown();
+            ImGui_ImplGlfw_Shutdown();
+            ImGui::DestroyContext();
+            if (texture) gl.DeleteTextures(1, &texture);
+            glfwDestroyWindow(window);
+        }
+        glfwTerminate();
+    }
+};
+
+Window::Window(ViewSession& session, const WindowOptions& options)
+    : session_(session), screen_(std::make_unique<Screen>()) {
+    glfwSetErrorCallback([](int, const char* text) { lastError = text; });
+    if (!glfwInit()) throw IoError("no window can be opened: " + lastError);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+    GLFWwindow* window = glfwCreateWindow(options.width, options.height, "Tessera", nullptr, nullptr);
+    if (!window) {
+        glfwTerminate();
+        throw IoError("no window with OpenGL 4.5 can be opened: " + lastError);
+    }
+    Screen& screen = *screen_;
+    glfwSetWindowUserPointer(window, &screen);
+    glfwMakeContextCurrent(window);
+    glfwSwapInterval(0);
+    glfwSetWindowSizeLimits(window, 480, 320, GLFW_DONT_CARE, GLFW_DONT_CARE);
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int, int action, int) {
+        Screen& s = Screen::of(w);
+        s.buttonsDown += action == GLFW_PRESS ? 1 : -1;
+        ++s.inputs;
+    });
+    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double, double) {
+        if (Screen::of(w).buttonsDown > 0) ++Screen::of(w).inputs;
+    });
+    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double) { ++Screen::of(w).inputs; });
+    glfwSetKeyCallback(window, [](GLFWwindow* w, int, int, int, int) { ++Screen::of(w).inputs; });
+    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { ++Screen::of(w).inputs; });
+    glfwSetWindowCloseCallback(window, [](GLFWwindow* w) { ++Screen::of(w).inputs; });
+    glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
+        for (int i = 0; i < count; ++i) Screen::of(w).dropped.emplace_back(paths[i]);
+        ++Screen::of(w).inputs;
+    });
+
+    screen.gl = loadGlFunctions([](const char* name) { return glfwGetProcAddress(name); });
+    IMGUI_CHECKVERSION();
+    ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = nullptr;
+    float scaleY = 1;
+    glfwGetWindowContentScale(window, &screen.scale, &scaleY);
+    ImGui::GetStyle().ScaleAllSizes(screen.scale);
+    ImGui::GetIO().FontGlobalScale = screen.scale;
+    ImGui_ImplGlfw_InitForOpenGL(window, true);
+    ImGui_ImplOpenGL3_Init("#version 330 core");
+    screen.window = window;
+    screen.state.scenePath = options.scenePath;
+    screen.state.picturePath = options.picturePath;
+    screen.state.isLight = options.isLight;
+}
+
+Window::~Window() = default;
+
+namespace {
+
+/// Changes the camera as a drag.
+void moveCamera(ViewSession& session, const std::function<void(ViewCamera&)>& move) {
+    ViewCamera camera = session.viewCamera();
+    move(camera);
+    Json json = session.document().json();
+    json["camera"] = camera.json();
+    session.document().drag(std::move(json));
+    session.touch();
+}
+
+void lookAlong(ViewSession& session, const Vec3d& direction) {
+    Json json = session.document().json();
+    json["camera"] = {{"direction", {direction.x, direction.y, direction.z}}};
+    session.document().change(std::move(json));
+}
+
+void handleKeys(ViewSession& session, Window*, PanelState& state, GLFWwindow* window) {
+    const ImGuiIO& io = ImGui::GetIO();
+    if (io.WantTextInput) return;
+    const auto pressed = [](int key) { return ImGui::IsKeyPressed(key, false); };
+    if (io.KeyCtrl) {
+        if (pressed(GLFW_KEY_Z)) io.KeyShift ? session.document().redo() : session.document().undo();
+        if (pressed(GLFW_KEY_Y)) session.document().redo();
+        if (pressed(GLFW_KEY_S)) saveScene(session, state);
+        if (pressed(GLFW_KEY_P)) savePicture(session, state);
+        if (pressed(GLFW_KEY_Q)) glfwSetWindowShouldClose(window, GLFW_TRUE);
+        return;
+    }
+    if (pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1)) state.showsHelp = !state.showsHelp;
+    if (pressed(GLFW_KEY_T)) state.isLight = !state.isLight;
+    if (pressed(GLFW_KEY_TAB)) state.isOpen = !state.isOpen;
+    if (!session.source()) return;
+    if (pressed(GLFW_KEY_G)) toggleEffect(session, "bricks");
+    if (pressed(GLFW_KEY_B)) addBookmark(session, state);
+    if (pressed(GLFW_KEY_F)) {
+        Json json = session.document().json();
+        json.erase("camera");
+        session.document().change(std::move(json));
+    }
+    if (pressed(GLFW_KEY_V) && session.mesh()) {
+        Json json = session.document().json();
+        if (session.document().scene().bricks.pixelsAVoxel > 0)
+            json["bricks"].erase("view");
+        else
+            json["bricks"]["view"] = 4;
+        session.document().change(std::move(json));
+    }
+    const std::pair<int, int> axes[] = {{GLFW_KEY_X, 0}, {GLFW_KEY_Y, 1}, {GLFW_KEY_Z, 2}};
+    for (const auto& [key, axis] : axes)
+        if (pressed(key)) {
+            Vec3d direction(0);
+            direction[axis] = io.KeyShift ? -1 : 1;
+            lookAlong(session, direction);
+        }
+    const auto held = [](int key) { return ImGui::IsKeyDown(key) ? 1.0 : 0.0; };
+    const double step = kFlyASecond * std::min(double(io.DeltaTime), 0.2);
+    const double ahead = held(GLFW_KEY_W) - held(GLFW_KEY_S), right = held(GLFW_KEY_D) - held(GLFW_KEY_A),
+                 above = held(GLFW_KEY_E) - held(GLFW_KEY_Q);
+    const double turn = held(GLFW_KEY_RIGHT) - held(GLFW_KEY_LEFT),
+                 tilt = held(GLFW_KEY_UP) - held(GLFW_KEY_DOWN);
+    if (ahead != 0 || right != 0 || above != 0)
+        moveCamera(session,
+                   [&](ViewCamera& camera) { camera.fly(step * ahead, step * right, step * above); });
+    if (turn != 0 || tilt != 0)
+        moveCamera(session, [&](ViewCamera& camera) { camera.orbit(step * turn, step * tilt); });
+    static bool wasMoving = false;
+    const bool isMoving = ahead != 0 || right != 0 || above != 0 || turn != 0 || tilt != 0;
+    if (wasMoving && !isMoving) session.document().endDrag();
+    wasMoving = isMoving;
+}
+
+/// Where the handle of a clip plane is: the place of the plane that is nearest to the middle of the data.
+struct ClipHandle {
+    std::array<double, 2> at{},
+        ahead{};           // pixels of the picture; ahead: a tenth of the data along the normal
+    double stepWorld = 0;  // from `at` to `ahead`, in offsets
+};
+
+std::optional<ClipHandle> clipHandle(const ViewSession& session, const Json& plane) {
+    Vec3d normal;
+    for (int a = 0; a < 3; ++a) normal[a] = plane["normal"][std::size_t(a)].get<double>();
+    const Box3d& bounds = session.source()->boundsWorld();
+    const Vec3d middle = 0.5 * (bounds.min + bounds.max);
+    const double square = glm::dot(normal, normal);
+    const Vec3d place = middle + (plane["offset"].get<double>() - glm::dot(normal, middle)) / square * normal;
+    const double step = 0.1 * glm::length(bounds.size()) / std::sqrt(square);
+    const auto at = session.pixelOf(place), ahead = session.pixelOf(place + step * normal);
+    if (!at || !ahead) return std::nullopt;
+    return ClipHandle{*at, *ahead, step * square};
+}
+
+}  // namespace
+
+void Window::showPicture() {
+    Screen& screen = *screen_;
+    const RgbImage& picture = session_.picture();
+    if (picture.width == 0) return;
+    const GlFunctions& gl = screen.gl;
+    if (screen.textureWidth != picture.width || screen.textureHeight != picture.height) {
+        if (screen.texture) gl.DeleteTextures(1, &screen.texture);
+        gl.CreateTextures(GL_TEXTURE_2D, 1, &screen.texture);
+        gl.TextureStorage2D(screen.texture, 1, GL_RGB8, picture.width, picture.height);
+        gl.TextureParameteri(screen.texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+        gl.TextureParameteri(screen.texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+        screen.textureWidth = picture.width, screen.textureHeight = picture.height;
+    }
+    gl.PixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    gl.TextureSubImage2D(screen.texture, 0, 0, 0, picture.width, picture.height, GL_RGB, GL_UNSIGNED_BYTE,
+                         picture.rgb.data());
+}
+
+void Window::drawOnce(bool isPictureNew) {
+    Screen& screen = *screen_;
+    PanelState& state = screen.state;
+    if (isPictureNew) showPicture();
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    state.isLight ? ImGui::StyleColorsLight() : ImGui::StyleColorsDark();
+    ImGui::NewFrame();
+    const ImGuiIO& io = ImGui::GetIO();
+    const float left = screen.panelWidth(), wide = io.DisplaySize.x - left;
+    const float bar = kStatusHeight * screen.scale, high = io.DisplaySize.y - bar;
+    if (state.isOpen) drawPanel(session_, state, left, io.DisplaySize.y);
+    drawStatus(session_, state, left, high, wide, bar);
+    drawHelp(state);
+
+    // The picture, and what a hand does there.
+    ImGui::SetNextWindowPos({left, 0});
+    ImGui::SetNextWindowSize({wide, high});
+    ImGui::PushStyleVar(ImGuiStyleVar_WindowPadding, {0, 0});
+    ImGui::Begin("picture", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoBringToFrontOnFocus | ImGuiWindowFlags_NoBackground);
+    ImDrawList& draw = *ImGui::GetWindowDrawList();
+    if (screen.texture && session_.source())
+        draw.AddImage(ImTextureID(std::intptr_t(screen.texture)), {left, 0}, {left + wide, high});
+    ImGui::SetCursorPos({0, 0});
+    ImGui::InvisibleButton("hand", {std::max(wide, 1.0f), std::max(high, 1.0f)},
+                           ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
+                               ImGuiButtonFlags_MouseButtonMiddle);
+    const bool isHovered = ImGui::IsItemHovered(), isActive = ImGui::IsItemActive();
+    // Pixels of the picture for one of the window.
+    const double dense = double(session_.width()) / std::max(double(wide), 1.0);
+    const std::array<double, 2> mouse{(io.MousePos.x - left) * dense, io.MousePos.y * dense};
+    if (session_.source()) {
+        const Json& json = session_.document().json();
+        if (json.contains("clip") && json["clip"].contains("planes")) {
+            const Json planes = json["clip"]["planes"];
+            for (std::size_t i = 0; i < planes.size(); ++i) {
+                const auto handle = clipHandle(session_, planes[i]);
+                if (!handle) continue;
+                const auto on = [&](const std::array<double, 2>& p) {
+                    return ImVec2(left + float(p[0] / dense), float(p[1] / dense));
+                };
+                const ImVec2 a = on(handle->at), b = on(handle->ahead);
+                const bool isNear = std::hypot(a.x - io.MousePos.x, a.y - io.MousePos.y) < kHandleReach;
+                const ImU32 colour = isNear || screen.handle == int(i) ? IM_COL32(255, 200, 60, 255)
+                                                                       : IM_COL32(255, 140, 0, 220);
+                draw.AddLine(a, b, colour, 2);
+                draw.AddCircleFilled(a, 6, colour);
+                if (isNear && ImGui::IsItemClicked(ImGuiMouseButton_Left)) screen.handle = int(i);
+                if (screen.handle == int(i) && isActive) {
+                    const double x = handle->ahead[0] - handle->at[0], y = handle->ahead[1] - handle->at[1];
+                    const double along = (io.MouseDelta.x * dense * x + io.MouseDelta.y * dense * y) /
+                                         std::max(x * x + y * y, 1.0);
+                    if (along != 0) {
+                        Json moved = json;
+                        Json& offset = moved["clip"]["planes"][i]["offset"];
+                        offset = offset.get<double>() + along * handle->stepWorld;
+                        session_.document().drag(std::move(moved));
+                        session_.touch();
+                    }
+                }
+            }
+        }
+        if (isActive && screen.handle < 0 && (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)) {
+            const double right = io.MouseDelta.x / std::max(double(high), 1.0),
+                         down = io.MouseDelta.y / std::max(double(high), 1.0);
+            const bool isMiddle = ImGui::IsMouseDown(ImGuiMouseButton_Middle);
+            if (isMiddle || (ImGui::IsMouseDown(ImGuiMouseButton_Left) && io.KeyShift))
+                moveCamera(session_, [&](ViewCamera& camera) { camera.pan(right, -down); });
+            else if (ImGui::IsMouseDown(ImGuiMouseButton_Right))
+                moveCamera(session_, [&](ViewCamera& camera) { camera.zoom(std::exp(-3 * down)); });
+            else
+                moveCamera(session_, [&](ViewCamera& camera) { camera.orbit(right, -down); });
+        }
+        if (ImGui::IsItemDeactivated()) {
+            session_.document().endDrag();
+            screen.handle = -1;
+        }
+        if (isHovered && io.MouseWheel != 0) {
+            moveCamera(session_,
+                       [&](ViewCamera& camera) { camera.zoom(std::exp(0.15 * double(io.MouseWheel))); });
+            session_.document().endDrag();
+        }
+        if (isHovered && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left))
+            if (const auto seen = session_.seenAt(mouse[0], mouse[1])) setFocus(session_, seen->placeWorld);
+        if (isHovered && !isActive) {
+            if (screen.lastMouse != mouse) {
+                const auto seen = session_.seenAt(mouse[0], mouse[1]);
+                state.underCursor =
+                    seen
+                        ? fmt::format("{} = {:.5g} at {:.4g}, {:.4g}, {:.4g}", session_.source()->title(),
+                                      seen->value, seen->placeWorld.x, seen->placeWorld.y, seen->placeWorld.z)
+                        : "";
+                screen.lastMouse = mouse;
+            }
+        } else {
+            state.underCursor.clear();
+        }
+    }
+    ImGui::End();
+    ImGui::PopStyleVar();
+    if (!state.messages.empty()) {
+        ImGui::SetNextWindowPos({left + 12, 12});
+        ImGui::Begin("messages", nullptr,
+                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                         ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoFocusOnAppearing);
+        for (const std::string& message : state.messages) ImGui::TextUnformatted(message.c_str());
+        if (ImGui::SmallButton("read")) state.messages.clear();
+        ImGui::End();
+    }
+    handleKeys(session_, this, state, screen.window);
+
+    ImGui::Render();
+    const GlFunctions& gl = screen.gl;
+    int framebufferWidth = 0, framebufferHeight = 0;
+    glfwGetFramebufferSize(screen.window, &framebufferWidth, &framebufferHeight);
+    gl.Viewport(0, 0, framebufferWidth, framebufferHeight);
+    const float shade = state.isLight ? 0.94f : 0.1f;
+    gl.ClearColor(shade, shade, shade, 1);
+    gl.Clear(GL_COLOR_BUFFER_BIT);
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+    glfwSwapBuffers(screen.window);
+}
+
+void Window::run(const std::function<bool()>& isEnding) {
+    Screen& screen = *screen_;
+    PanelState& state = screen.state;
+    Clock::time_point drawn{};
+    std::size_t inputs = 0, pictureNumber = 0;
+    bool isBusy = true;
+    std::string title;
+    while (!glfwWindowShouldClose(screen.window) && !isEnding()) {
+        isBusy ? glfwPollEvents() : glfwWaitEventsTimeout(0.25);
+        for (const std::string& path : std::exchange(screen.dropped, {})) try {
+                if (path.ends_with(".json"))
+                    session_.document().change(SceneDocument::read(path).json());
+                else
+                    session_.open(path);
+            } catch (const std::exception& error) {
+                state.messages.emplace_back(error.what());
+            }
+        int framebufferWidth = 0, framebufferHeight = 0;
+        glfwGetFramebufferSize(screen.window, &framebufferWidth, &framebufferHeight);
+        const bool isShown = framebufferWidth > 0 && framebufferHeight > 0 &&
+                             glfwGetWindowAttrib(screen.window, GLFW_ICONIFIED) == GLFW_FALSE;
+        if (isShown) {
+            int windowWidth = 1, windowHeight = 1;
+            glfwGetWindowSize(screen.window, &windowWidth, &windowHeight);
+            const double dense = double(framebufferWidth) / std::max(windowWidth, 1);
+            session_.resize(framebufferWidth - int(std::lround(screen.panelWidth() * dense)),
+                            framebufferHeight - int(std::lround(kStatusHeight * screen.scale * dense)));
+        }
+        if (session_.path() != title) {
+            title = session_.path();
+            glfwSetWindowTitle(screen.window,
+                               (std::filesystem::path(title).filename().string() + " - Tessera").c_str());
+        }
+        ViewSession::Did did = ViewSession::Did::nothing;
+        try {
+            const std::size_t before = screen.inputs;
+            if (!screen.hasFailed)
+                did = session_.work([&] {
+                    glfwPollEvents();
+                    return screen.inputs != before || isEnding();
+                });
+        } catch (const GlError& error) {
+            state.messages.emplace_back(error.what());
+            std::erase_if(screen.recoveries,
+                          [](Clock::time_point at) { return Clock::now() - at > kRecoveriesWithin; });
+            screen.recoveries.push_back(Clock::now());
+            screen.hasFailed = int(screen.recoveries.size()) > kMostRecoveries;
+            if (!screen.hasFailed) session_.recover();
+        } catch (const std::exception& error) {
+            state.messages.emplace_back(error.what());
+        }
+        for (std::string& message : session_.takeMessages()) state.messages.push_back(std::move(message));
+        for (const FrameTime& frame : session_.takeFrames())
+            state.frameMs = frame.ms, state.frameScale = frame.scale;
+        isBusy = did != ViewSession::Did::nothing || session_.isOpening();
+        const bool isPictureNew = session_.pictureNumber() != pictureNumber;
+        const bool isDue = isPictureNew || screen.inputs != inputs || msSince(drawn) > kIdleMs || !isBusy;
+        if (isShown && isDue) {
+            pictureNumber = session_.pictureNumber();
+            inputs = screen.inputs;
+            drawOnce(isPictureNew);
+            drawn = Clock::now();
+        } else if (did == ViewSession::Did::nothing && isBusy) {
+            glfwWaitEventsTimeout(0.02);  // a file is being read
+        }
+    }
+}
+
+}  // namespace tessera

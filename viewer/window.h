@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "view/view_session.h"
+
+struct GLFWwindow;
+
+namespace tessera {
+
+struct WindowOptions {
+    int width = 1280, height = 800;  ///< screen coordinates
+    bool isLight = false;
+    std::string scenePath = "scene.json", picturePath = "picture.png";  ///< where the buttons save
+};
+
+/// The window around a session: draws what it shows, and turns keys and the mouse into changes of the scene.
+class Window {
+  public:
+    /// Throws EnvironmentError without a display, or without OpenGL 4.5 on it.
+    Window(ViewSession& session, const WindowOptions& options);
+    ~Window();
+    Window(const Window&) = delete;
+    Window& operator=(const Window&) = delete;
+
+    /// Until the user closes it, or `isEnding` says so.
+    void run(const std::function<bool()>& isEnding);
+
+  private:
+    struct Screen;
+    void showPicture();
+    void drawOnce(bool isPictureNew);
+
+    ViewSession& session_;
+    std::unique_ptr<Screen> screen_;
+};
+
+}  // namespace tessera
