@@ -64,6 +64,10 @@ class PictureSource {
     /// What the bricks are made of; null where it isn't known.
     virtual const TetMesh* sourceMesh() const { return nullptr; }
 
+    /// The largest error measured in each of bricks(), over the field's range, NaN where none was; empty
+    /// where that isn't known.
+    virtual std::vector<float> brickErrors() const { return {}; }
+
     // What is to be drawn, as it is now:
     virtual const BrickPool& pool() const = 0;
     virtual const BrickFrame& frame() const = 0;

@@ -57,7 +57,12 @@ ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isO
     options.effects = scene.effects;
     options.values = source.range();
     options.boundsWorld = source.boundsWorld();
-    if (isOnScreen) picture.marks = linesOf(options.effects, {options.camera, options.boundsWorld}).marks;
+    LineView view{options.camera, options.boundsWorld};
+    if (std::ranges::any_of(options.effects, &Effect::needsBrickNumbers)) {
+        options.brickNumbers = source.brickErrors();
+        view.largestBrickNumber = largestOf(options.brickNumbers);
+    }
+    if (isOnScreen) picture.marks = linesOf(options.effects, view).marks;
     return picture;
 }
 

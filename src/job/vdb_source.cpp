@@ -95,6 +95,7 @@ class VdbSource : public PictureSource {
         // What lies beyond the layers of an extension isn't read.
         if (file.layers == 0)
             for (const std::string& note : stored.notes) job.say(note + "\n");
+        if (file.statistics) errors_ = std::move(file.statistics->errors);
         stored_ = std::move(stored.bricks);
         for (std::size_t i = 0; i < stored_.size(); ++i) {
             const DepthKey& key = stored_[i].leaf.key;
@@ -120,6 +121,12 @@ class VdbSource : public PictureSource {
                 return Samples{key, stored_[at->second].samples};
         }
         return std::nullopt;
+    }
+    std::vector<float> brickErrors() const override {
+        std::vector<float> errors;
+        if (!errors_.empty())
+            for (const PlacedBrick& brick : placed_) errors.push_back(errors_[places_.at(brick.key)]);
+        return errors;
     }
     void moveTo(GlThread& thread) override { fillPool(thread); }
 
@@ -151,6 +158,7 @@ class VdbSource : public PictureSource {
     std::vector<ShownBrick> stored_;
     std::unordered_map<DepthKey, std::size_t, DepthKeyHash> places_;  // in stored_
     int deepest_ = 0;
+    std::vector<float> errors_;  // one of each; empty: the file has none
     std::vector<PlacedBrick> placed_;
     std::optional<BrickPool> pool_;
 };

@@ -28,6 +28,7 @@ struct EffectScene {
     double pixelSize = 0;
     Vec3d eyeWorld{0};  ///< places in shaders are relative to it
     const TransferFunction& function;
+    double largestBrickNumber = 0;  ///< of those that are known
 
     void set(const char* name, int value) const;
     void set(const char* name, double value) const;
@@ -72,8 +73,9 @@ struct Effect {
     std::string surface;
     /// bool f(vec3 origin, vec3 direction, float at): whether nothing of the volume is shown there.
     std::string hide;
-    bool needsAllBricks = false;  ///< those too of which the transfer function shows nothing
-    bool readsIndex = false;      ///< needs the pool's index of bricks
+    bool needsAllBricks = false;     ///< those too of which the transfer function shows nothing
+    bool needsBrickNumbers = false;  ///< RenderOptions::brickNumbers
+    bool readsIndex = false;         ///< needs the pool's index of bricks
     std::function<void(const EffectScene&)> setUniforms;  ///< none: it has none
     /// Lines in the volume, and marks on the picture. An effect may have nothing else.
     std::function<PictureLines(const LineView&)> lines;

@@ -25,6 +25,7 @@ struct LineView {
     Camera camera;
     Box3d boundsWorld{};              ///< of the data
     double coarsestSpacingWorld = 0;  ///< of the bricks; 0: it isn't known yet
+    double largestBrickNumber = 0;    ///< of those that effects show
 };
 /// PictureMarks::dotPixels for a picture of that size.
 int dotPixelsOf(const Camera& camera);

@@ -39,7 +39,8 @@ struct DeviceBrick {
     std::array<std::int32_t, 3> index;
     std::int32_t depth;
     float firstSlab;
-    std::array<float, 3> padding;
+    float effectNumber;
+    std::array<float, 2> padding;
 };
 struct DeviceStop {
     std::array<float, 4> shown;
@@ -183,7 +184,8 @@ class Scene {
                 std::max({size.x, size.y, size.z}),
                 pixelSize(),
                 eye_,
-                options_.function};
+                options_.function,
+                largestOf(options_.brickNumbers)};
     }
 
   private:
@@ -245,6 +247,13 @@ void checkOptions(const BrickPool& pool, const RenderOptions& options) {
 
 void EffectScene::set(const char* name, int value) const {
     gl.ProgramUniform1i(program.id(), program.uniform(name), value);
+}
+
+double largestOf(std::span<const float> brickNumbers) {
+    double largest = 0;
+    for (const float number : brickNumbers)
+        if (std::isfinite(number)) largest = std::max(largest, double(number));
+    return largest;
 }
 
 void EffectScene::set(const char* name, double value) const {
@@ -526,6 +535,9 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
                               std::span<const PlacedBrick> bricks, const RenderOptions& options,
                               const Execution& execution, RenderCounts* counts) {
     checkOptions(pool, options);
+    const bool hasNumbers = std::ranges::any_of(options.effects, &Effect::needsBrickNumbers);
+    if (hasNumbers && options.brickNumbers.size() != bricks.size())
+        throw InputError("an effect needs a number for each brick");
     const Scene scene(pool, frame, bricks, options);
     const std::vector<const PlacedBrick*> seen = scene.inOrder(bricks);
     std::vector<DeviceBrick> placed;
@@ -535,6 +547,9 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
         if (runs.empty() || runs.back().atlas != atlas) runs.push_back({atlas, placed.size(), 0});
         ++runs.back().count;
         placed.push_back(scene.placed(*brick));
+        if (!hasNumbers) continue;
+        const float number = options.brickNumbers[std::size_t(brick - bricks.data())];
+        placed.back().effectNumber = std::isfinite(number) ? number : -1;
     }
     const std::vector<DeviceStop> stops = scene.stops();
     const int side = int(std::lround(std::sqrt(options.samplesAPixel)));  // rays along a pixel's edge

@@ -33,6 +33,8 @@ struct RenderOptions {
     ValueRange values;
     /// In the order in which they shade.
     std::vector<Effect> effects;
+    /// For effects that need it a number of each brick, at least 0; NaN where it isn't known.
+    std::vector<float> brickNumbers;
     /// What of the pool is data, for effects that show its extent.
     Box3d boundsWorld{};
     /// Rays along an edge of what is drawn at once, 64 to 1024; a picture is cancelled between such parts.
@@ -40,6 +42,9 @@ struct RenderOptions {
     /// Called before each part; may be null.
     std::function<void()> beforeTile = nullptr;
 };
+
+/// Of those that are known; 0 without any.
+double largestOf(std::span<const float> brickNumbers);
 
 struct RenderCounts {
     std::int64_t bricks = 0;        ///< drawn

@@ -6,6 +6,7 @@
 #include "render/effects/axes.h"
 #include "render/effects/bricks.h"
 #include "render/effects/cuts.h"
+#include "render/effects/errors.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
 #include "render/effects/probes.h"
@@ -323,6 +324,15 @@ Effect readScaleBar(const JsonNode& json, const Scene& scene) {
     return scaleBarEffect({color ? readColour(*color) : inkOn(scene.ground), scene.lengthUnit});
 }
 
+Effect readErrors(const JsonNode& json, const Scene& scene) {
+    json.expectKeys({"bound", "strength"});
+    ErrorTint tint;
+    if (const auto bound = json.find("bound")) tint.bound = bound->length();
+    tint.strength = readShare(json, "strength", tint.strength);
+    tint.wordsColor = inkOn(scene.ground);
+    return errorsEffect(tint);
+}
+
 SceneOutline readOutline(const JsonNode& json, const Scene& scene) {
     json.expectKeys({"mesh", "angle", "edges", "width", "color"});
     SceneOutline outline;
@@ -344,12 +354,13 @@ SceneOutline readOutline(const JsonNode& json, const Scene& scene) {
 
 /// @param scene what is read already.
 std::vector<Effect> readEffects(const JsonNode& json, Scene& scene) {
-    json.expectKeys({"axes", "bricks", "cuts", "isosurfaces", "outline", "preintegration", "probes",
+    json.expectKeys({"axes", "bricks", "cuts", "errors", "isosurfaces", "outline", "preintegration", "probes",
                      "scale_bar", "shading"});
     std::vector<Effect> effects;
     if (const auto axes = json.find("axes")) effects.push_back(readAxes(*axes, scene));
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
     if (const auto cuts = json.find("cuts")) effects.push_back(readCuts(*cuts));
+    if (const auto errors = json.find("errors")) effects.push_back(readErrors(*errors, scene));
     if (const auto surfaces = json.find("isosurfaces")) effects.push_back(readIsosurfaces(*surfaces));
     if (const auto outline = json.find("outline")) {
         scene.outline = readOutline(*outline, scene);

@@ -1225,6 +1225,17 @@ class Pictures(AppTest):
         self.reject(2, "scene.json effects.outline.mesh missing", "render", self.vdb, *out, "--scene", self.scene(effects={"outline": {}}))
         self.succeed("render", self.cube, *out, "--scene", self.scene(effects={"outline": {}}, bricks={"resolution": 17, "cells": 8}))
 
+    def test_errors_of_bricks_are_shown_where_the_file_has_them(self):
+        path = self.scene(effects={"errors": {}}, legend=False)
+        self.reject(2, "scene.json effects.errors --brick-statistics", "render", self.vdb, "-o", "x.png", "--scene", path)
+        known = self.folder / "known.vdb"
+        self.succeed("resample", self.cube, "-o", known, "--refine", "uniform", "--resolution", "17", "--brick-size", "8", "--extend", "1",
+                     "--brick-statistics", "--quiet")
+        self.report("render", known, "-o", "out.png", "--size", "60x48", "--scene", path)
+        tinted = self.pixels()
+        self.report("render", known, "-o", "out.png", "--size", "60x48", "--scene", path, "--without", "errors")
+        self.assertNotEqual(self.pixels(), tinted)
+
     def test_a_picture_goes_to_standard_output(self):
         command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
         result = subprocess.run(command, capture_output=True, check=True, timeout=300)

@@ -14,6 +14,7 @@
 #include "render/effects/axes.h"
 #include "render/effects/bricks.h"
 #include "render/effects/cuts.h"
+#include "render/effects/errors.h"
 #include "render/effects/isosurfaces.h"
 #include "render/effects/preintegration.h"
 #include "render/effects/probes.h"
@@ -444,11 +445,70 @@ TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
     EXPECT_GT(clear, 256 * 256 / 5);
 }
 
+TEST_F(Effects, ErrorsColourTheirBricks) {
+    options.effects = {errorsEffect({.bound = 0.1, .strength = 0.5})};
+    const std::size_t count = pictured->bricks.size();
+    const auto drawn = [&](const std::vector<float>& errors) {
+        options.brickNumbers = errors;
+        return pictured->draw(options);
+    };
+    // The volume's colour is (1, 0.5, 0.25), and half of it is left.
+    const std::pair<float, std::array<double, 3>> cases[] = {{0, {0.23, 0.30, 0.75}},
+                                                             {0.05f, {0.87, 0.87, 0.87}},
+                                                             {0.075f, {0.81, 0.445, 0.51}},
+                                                             {0.2f, {0.40, 0.0, 0.45}},
+                                                             {NAN, {0.35, 0.60, 0.35}}};
+    for (const auto& [error, color] : cases) {
+        const RgbaImage image = drawn(std::vector<float>(count, error));
+        const Rgba& pixel = image.at(48, 48);
+        ASSERT_GT(pixel[3], 0.1f);
+        const std::array own{0.5, 0.25, 0.125};
+        for (std::size_t c = 0; c < 3; ++c)
+            EXPECT_NEAR(double(pixel[c] / pixel[3]), 0.5 * color[c] + own[c], 1e-4) << error;
+    }
+    // One brick's error is seen there alone.
+    std::vector<float> errors(count, 0.f);
+    const RgbaImage plain = drawn(errors);
+    const Vec3d inside(0.8, 0.2, 0.8);
+    Box3d box;
+    for (std::size_t i = 0; i < count; ++i) {
+        const Box3d own = pictured->frame.boxWorld(pictured->bricks[i].key);
+        if (glm::any(glm::lessThan(inside, own.min)) || glm::any(glm::greaterThan(inside, own.max))) continue;
+        box = own;
+        errors[i] = 0.1f;
+    }
+    const RgbaImage marked = drawn(errors);
+    const CameraView view = viewOf(options.camera);
+    int differ = 0;
+    for (int y = 0; y < 96; ++y)
+        for (int x = 0; x < 96; ++x) {
+            if (plain.at(x, y) == marked.at(x, y)) continue;
+            ++differ;
+            const ViewRay ray = view.rayOf(options.camera, x, y);
+            double begin = 0, end = 1e9;
+            for (int a = 0; a < 3; ++a) {
+                const double low = (box.min[a] - ray.originWorld[a]) / ray.direction[a],
+                             high = (box.max[a] - ray.originWorld[a]) / ray.direction[a];
+                begin = std::max(begin, std::min(low, high));
+                end = std::min(end, std::max(low, high));
+            }
+            EXPECT_LT(begin, end + 1e-6);
+        }
+    EXPECT_GT(differ, 4);
+    options.brickNumbers.pop_back();
+    EXPECT_THROW(pictured->draw(options), InputError);
+    // A bar says what the colours are.
+    LineView marks{options.camera, {}, 0, 0.0123};
+    EXPECT_EQ(linesOf(std::vector{errorsEffect({})}, marks).marks.words[1].text, "1.23%");
+    EXPECT_EQ(linesOf(options.effects, marks).marks.words[1].text, "10%");
+}
+
 /// One of each.
 std::vector<Effect> everyEffect() {
     return {axesEffect({}),
             brickEdgesEffect({}),
             cutsEffect({.planes = {{}}}),
+            errorsEffect({}),
             isosurfacesEffect({{.value = 0.6}}),
             preintegrationEffect(),
             probesEffect({}),
@@ -467,6 +527,7 @@ class EffectCalls : public testing::Test {
         options.channel = 1;
         options.function = even(0.3);
         options.boundsWorld = {Vec3d(-1), Vec3d(1)};
+        options.brickNumbers.assign(pictured->bricks.size(), 0.5f);
     }
     GlCalls drawnBy(SliceRenderer& renderer, const std::vector<Effect>& effects) {
         options.effects = effects;

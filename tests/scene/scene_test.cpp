@@ -52,7 +52,7 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
         "layer": 0.5, "background": [0, 0.5, 1],
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
         "length_unit": "mm",
-        "effects": {"outline": {"mesh": "wing.vtu", "angle": 45}, "axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
+        "effects": {"errors": {"bound": 0.01}, "outline": {"mesh": "wing.vtu", "angle": 45}, "axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
                     "cuts": {"planes": [{"normal": [0, 0, 2], "offset": 3, "opacity": 0.5}],
                              "contours": {"values": [1, 2], "width": 2, "color": [1, 1, 1]}},
                     "probes": {"shapes": [{"difference": [{"box": [0, 0, 0, 1, 1, 1]},
@@ -87,7 +87,7 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_EQ(scene.lengthUnit, "mm");
     std::vector<std::string> names;
     for (const Effect& effect : scene.effects) names.push_back(effect.name);
-    EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "cuts", "isosurfaces", "outline",
+    EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "cuts", "errors", "isosurfaces", "outline",
                                                "preintegration", "probes", "scale_bar", "shading"}));
     EXPECT_EQ(scene.outline.mesh, path().substr(0, path().rfind('/') + 1) + "wing.vtu");
     EXPECT_EQ(scene.outline.shown.leastDegrees, 45);
@@ -146,11 +146,13 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
          "effects.axes.color: expected three"},
         {R"({"version": 1, "effects": {"scale_bar": {"length": 1}}})",
          "effects.scale_bar: unknown key \"length\""},
+        {R"({"version": 1, "effects": {"errors": {"bound": 0}}})",
+         "effects.errors.bound: expected a number above 0"},
         {R"({"version": 1, "effects": {"outline": {"edges": "some"}}})",
          "effects.outline.edges: expected sharp or all"},
         {R"({"version": 1, "effects": {"outline": {"edges": "all", "angle": 20}}})",
          "effects.outline.angle: can't stand beside all edges"},
-        {R"({"version": 1, "effects": {"outline": {"mesh": ""}}})",
+        {R"({"version": 1, "effects": {"errors": {"bound": 0.01}, "outline": {"mesh": ""}}})",
          "effects.outline.mesh: expected the name of a file"},
         {R"({"version": 1, "length_unit": 1})", "length_unit: expected a text"},
         {R"({"version": 1, "effects": {"preintegration": {"table": 2}}})",

@@ -9,6 +9,7 @@ struct Brick {
     ivec3 index;
     int depth;
     float firstSlab;  // counted from the eye, the brick's nearest
-    float padding[3];
+    float effectNumber;  // of the brick, where an effect asks for one; below 0: it isn't known
+    float padding[2];
 };
 layout(std430, binding = 0) readonly buffer BrickBlock { Brick bricks[]; };
