@@ -372,7 +372,10 @@ void addTetsOptions(CLI::App& command, TetsArguments& arguments) {
 }
 
 void addRenderOptions(CLI::App& command, RenderArguments& a) {
-    command.add_option("input", a.request.input, "a .vdb file that tessera wrote, or a mesh")->required();
+    command
+        .add_option("input", a.frames.inputs,
+                    "a .vdb file that tessera wrote, or a mesh; of several each is one frame")
+        ->required();
     command
         .add_option("-o,--output", a.request.output,
                     "the picture: .png, or .exr with light and opacity as floats; - for a .png to standard "
@@ -396,12 +399,20 @@ void addRenderOptions(CLI::App& command, RenderArguments& a) {
         ->allow_extra_args(false);
     command.add_flag("--explain", a.request.explains,
                      "tell what each effect costs, and how much of the picture it changes");
+    command.add_option("--frames", a.frames.frames, "draw so many pictures, numbered from 1")
+        ->check(CLI::Range(1, 1'000'000));
+    auto* path = command.add_option(
+        "--path", a.frames.path,
+        "a JSON file with key frames that the camera moves through, from the first to the last");
+    command.add_flag("--orbit", a.frames.orbits, "the camera turns once around what it looks at")
+        ->excludes(path);
     command.add_option("--gl", a.gl, "OpenGL platform (default: the first that can be had)")
         ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
     addCommonOptions(command, a.common);
     command.footer(
         "Examples:\n  tessera render flow.vdb -o flow.png\n"
-        "  tessera render flow.vdb --scene scene.json -o flow.png --size 1920x1080 --samples 9");
+        "  tessera render flow.vdb --scene scene.json -o flow.png --size 1920x1080 --samples 9\n"
+        "  tessera render flow.vdb -o frame_%04d.png --frames 120 --orbit");
 }
 
 void addPictureOptions(CLI::App& command, PictureArguments& a) {

@@ -81,10 +81,17 @@ int runPicture(const PictureArguments& a) {
 
 int runRender(const RenderArguments& a) {
     RenderRequest request = a.request;
+    request.input = a.frames.inputs.front();
     if (isVdbName(request.input)) refuseReaderBounds(a.common.reader, request.input + " is no mesh");
     if (!a.size.empty()) request.size = parsePictureSize("--size", a.size);
     if (!a.gl.empty()) request.platform = parseGlPlatform(a.gl);
     Session session(a.common, request.output);
+    if (a.frames.inputs.size() > 1 || a.frames.frames || a.frames.orbits || !a.frames.path.empty()) {
+        FramesRequest frames = a.frames;
+        frames.picture = request;
+        session.writeReport(framesJson(frames, renderFrames(frames, session.job)));
+        return 0;
+    }
     session.writeReport(renderedJson(request, renderScene(request, session.job)));
     return 0;
 }

@@ -9,6 +9,7 @@
 #include "job/export_tets.h"
 #include "job/focus_trace.h"
 #include "job/paper_tables.h"
+#include "job/render_frames.h"
 #include "job/render_scene.h"
 #include "job/verify_file.h"
 #include "options.h"
@@ -40,6 +41,7 @@ struct RenderArguments {
     CommonOptions common;
     std::string size, gl;
     RenderRequest request;
+    FramesRequest frames;
 };
 /// Words for the program that has the window.
 struct ViewArguments {

@@ -25,6 +25,8 @@ namespace {
 /// 16 bytes each, and up to 20 more while they are written.
 constexpr std::int64_t kMostPixels = 200'000'000;
 
+}  // namespace
+
 Scene sceneOf(const RenderRequest& request) {
     Scene scene = request.scene.empty() ? Scene{} : readScene(request.scene);
     if (request.field) scene.field = *request.field;
@@ -42,6 +44,8 @@ Scene sceneOf(const RenderRequest& request) {
     }
     return scene;
 }
+
+namespace {
 
 /// Draws the picture again without each of its effects. The first drawing of all, which has made shaders, is
 /// done again too; of two the faster one counts.
@@ -92,17 +96,17 @@ std::string explanation(const RenderedPicture& picture, std::size_t width) {
                        picture.counts.draws);
 }
 
-/// Bricks of a mesh come to rest first.
-std::unique_ptr<PictureSource> openSource(const RenderRequest& request, const Scene& scene, GlThread& thread,
-                                          Job& job) {
-    if (isVdbName(request.input))
-        return openVdbSource(request.input, scene.field, scene.component, thread, job);
-    const MeshFile file = openMesh(request.input, {}, job);
+}  // namespace
+
+std::unique_ptr<PictureSource> openPictureSource(const std::string& input, const Scene& scene,
+                                                 GlThread& thread, Job& job) {
+    if (isVdbName(input)) return openVdbSource(input, scene.field, scene.component, thread, job);
+    const MeshFile file = openMesh(input, {}, job);
     std::unique_ptr<MeshSource> source;
     try {
         source = std::make_unique<MeshSource>(file.mesh, scene, 0, thread, job.execution);
     } catch (const InputError& error) {
-        throw InputError(request.input + ": " + error.what());
+        throw InputError(input + ": " + error.what());
     }
     source->setFocus(scene);
     source->live().scheduler().finish(job.execution);
@@ -113,10 +117,24 @@ std::unique_ptr<PictureSource> openSource(const RenderRequest& request, const Sc
     return source;
 }
 
+void describe(const PictureSource& source, const GlThread& thread, const Scene& scene,
+              RenderedPicture& picture) {
+    picture.field = source.title();
+    picture.platform = nameOf(thread.platform());
+    picture.device = thread.info().renderer;
+    picture.width = scene.width;
+    picture.height = scene.height;
+    picture.range = source.range();
+    picture.bricks = source.bricks().size();
+    picture.poolBytes = source.pool().deviceBytes();
+}
+
+namespace {
+
 RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job& job) {
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
-    const std::unique_ptr<PictureSource> source = openSource(request, scene, thread, job);
+    const std::unique_ptr<PictureSource> source = openPictureSource(request.input, scene, thread, job);
     const ScenePicture asked = pictureOf(withEffectsOf(scene, *source, job), *source, !isExr);
     if (asked.lacksLegend)
         job.warn(
@@ -139,14 +157,7 @@ RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job&
     else
         writePng(request.output, onScreen(asked, image));
     if (request.explains) picture.effects = explainEffects(asked.options, image, picture.counts, draw);
-    picture.field = source->title();
-    picture.platform = nameOf(thread.platform());
-    picture.device = thread.info().renderer;
-    picture.width = image.width;
-    picture.height = image.height;
-    picture.range = source->range();
-    picture.bricks = source->bricks().size();
-    picture.poolBytes = source->pool().deviceBytes();
+    describe(*source, thread, scene, picture);
     job.say(
         fmt::format("{}: {}, {} x {} pixels, values {:.6g} to {:.6g}; {} of {} bricks drawn in {:.0f} ms\n",
                     request.output, picture.field, picture.width, picture.height, picture.range.min,
@@ -156,6 +167,15 @@ RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job&
 }
 
 }  // namespace
+
+void throwNamed(const InputError& error, const RenderRequest& request, std::span<const std::string> inputs) {
+    // What doesn't fit the data was asked for by the scene, or by an option.
+    const std::string why = error.what();
+    const bool isOfInput =
+        std::ranges::any_of(inputs, [&](const std::string& input) { return why.starts_with(input + ":"); });
+    if (isOfInput || request.field || request.component) throw InputError(why);
+    throw InputError((request.scene.empty() ? inputs.front() : request.scene) + ": " + why);
+}
 
 RenderedPicture renderScene(const RenderRequest& request, Job& job) {
     checkOutputPaths({request.input, request.scene},
@@ -169,11 +189,7 @@ RenderedPicture renderScene(const RenderRequest& request, Job& job) {
     try {
         return drawScene(request, scene, job);
     } catch (const InputError& error) {
-        // What doesn't fit the data was asked for by the scene, or by an option.
-        const std::string why = error.what();
-        const bool isOfInput = why.starts_with(request.input + ":");
-        if (isOfInput || request.field || request.component) throw;
-        throw InputError((request.scene.empty() ? request.input : request.scene) + ": " + why);
+        throwNamed(error, request, std::vector{request.input});
     }
 }
 

@@ -1,15 +1,21 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "gl/gl_platform.h"
+#include "gl/gl_thread.h"
 #include "job/job.h"
+#include "job/picture_source.h"
 #include "job/run_report.h"
 #include "mesh/field_range.h"
 #include "render/slice_renderer.h"
+#include "scene/scene.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -47,6 +53,20 @@ struct RenderedPicture {
     RenderCounts counts;
     std::vector<EffectCost> effects;  ///< when asked for
 };
+
+/// The scene of a request, with what the request has in its place. Throws InputError, IoError.
+Scene sceneOf(const RenderRequest& request);
+/// A .vdb file, or a mesh whose bricks have come to rest. Throws as openVdbSource() and MeshSource do.
+std::unique_ptr<PictureSource> openPictureSource(const std::string& input, const Scene& scene,
+                                                 GlThread& thread, Job& job);
+/// All but the counts.
+void describe(const PictureSource& source, const GlThread& thread, const Scene& scene,
+              RenderedPicture& picture);
+
+/// Throws the error with the name of the file that it is about: the scene's, unless it names an input or
+/// options are in the scene's place.
+[[noreturn]] void throwNamed(const InputError& error, const RenderRequest& request,
+                             std::span<const std::string> inputs);
 
 /// A .png is drawn over the scene's background, with its legend; an .exr has light in place of a screen's
 /// values, multiplied by the opacity A, without a background or legend. Throws InputError for a scene that

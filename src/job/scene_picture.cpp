@@ -37,15 +37,21 @@ std::function<Rgb(double)> coloursOf(TransferFunction function) {
 
 }  // namespace
 
+int legendPixelsOf(const Scene& scene, const PictureSource& source, bool isOnScreen) {
+    if (!scene.hasLegend || !isOnScreen) return 0;
+    const LegendOptions legend =
+        legendOf(scene, source.title(), shownRangeOf(scene.function, source.range()));
+    return legendPixels(legend, scene.width, scene.height);
+}
+
 ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isOnScreen) {
     ScenePicture picture;
     picture.ground = scene.ground;
     const std::array<double, 2> shownRange = shownRangeOf(scene.function, source.range());
     picture.legend = legendOf(scene, source.title(), shownRange);
-    const bool wantsLegend = scene.hasLegend && isOnScreen;
-    const int besides = wantsLegend ? legendPixels(picture.legend, scene.width, scene.height) : 0;
+    const int besides = legendPixelsOf(scene, source, isOnScreen);
     picture.hasLegend = besides > 0;
-    picture.lacksLegend = wantsLegend && besides == 0;
+    picture.lacksLegend = scene.hasLegend && isOnScreen && besides == 0;
     RenderOptions& options = picture.options;
     options.camera = cameraOf(scene, source.boundsWorld(), besides);
     options.function = functionOf(scene.function, source.range(), source.histogram(shownRange));

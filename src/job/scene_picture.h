@@ -20,6 +20,9 @@ struct ScenePicture {
     bool lacksLegend = false;  ///< it is asked for, and there isn't
 };
 
+/// What the legend of a scene's picture on a screen takes of its width; 0 without one.
+int legendPixelsOf(const Scene& scene, const PictureSource& source, bool isOnScreen);
+
 /// @param isOnScreen with its legend, beside which a camera that is to be found leaves the data.
 /// Throws InputError for a scene that doesn't fit the source.
 ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isOnScreen);

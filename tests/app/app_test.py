@@ -1236,6 +1236,44 @@ class Pictures(AppTest):
         self.report("render", known, "-o", "out.png", "--size", "60x48", "--scene", path, "--without", "errors")
         self.assertNotEqual(self.pixels(), tinted)
 
+    def test_a_camera_that_moves_makes_numbered_pictures(self):
+        size = ("--size", "60x48", "--samples", "1")
+        report = self.report("render", self.vdb, "-o", "turn.png", "--frames", "4", "--orbit", *size)
+        names = [f"turn_{n:04}.png" for n in (1, 2, 3, 4)]
+        self.assertEqual(report["output"], names)
+        pictures = [self.pixels(name) for name in names]
+        self.assertEqual(len(set(map(repr, pictures))), 4)
+        keys = [{"eye": [3, 2, 1], "target": [0.5, 0.5, 0.5]}, {"eye": [2, 3, 1], "target": [0.5, 0.5, 0.5]}]
+        path = self.write("path.json", json.dumps({"version": 1, "keys": keys}))
+        self.succeed("render", self.vdb, "-o", "p%02d.png", "--frames", "3", "--path", path, "--scene", self.scene(legend=False), *size)
+        # The ends are the pictures of the keys.
+        for name, key in (("p01.png", keys[0]), ("p03.png", keys[1])):
+            self.succeed("render", self.vdb, "-o", "one.png", "--scene", self.scene(camera=key, legend=False), *size)
+            self.assertEqual(self.pixels(name), self.pixels("one.png"))
+        out = ("-o", "x.png")
+        self.reject(2, "--frames --path", "render", self.vdb, *out, "--frames", "3")
+        self.reject(2, "--frames", "render", self.vdb, *out, "--orbit")
+        self.reject(2, "standard output", "render", self.vdb, "-o", "-", "--orbit", "--frames", "2")
+        self.reject(2, "--explain", "render", self.vdb, *out, "--orbit", "--frames", "2", "--explain")
+        self.reject(2, "path.json keys[0]", "render", self.vdb, *out, "--frames", "2", "--path", self.write("path.json", '{"version": 1, "keys": [{}]}'))
+        self.reject(2, "replace", "render", self.vdb, "-o", "path.png", "--frames", "2", "--orbit", "--json", "path_0002.png")
+
+    def test_several_files_are_a_picture_each(self):
+        other = self.folder / "other.vdb"
+        self.succeed("resample", self.cube, "-o", other, "--refine", "uniform", "--resolution", "9", "--brick-size", "8", "--extend", "1", "--quiet")
+        size = ("--size", "60x48", "--samples", "1")
+        scene = self.scene(transfer_function={"range": [0, 1], "opacity": [[0, 0.5]]}, legend=False)
+        report = self.report("render", self.vdb, other, "-o", "s.png", "--scene", scene, *size)
+        self.assertEqual(report["output"], ["s_0001.png", "s_0002.png"])
+        self.assertEqual(len(report["input"]), 2)
+        self.succeed("render", self.vdb, "-o", "one.png", "--scene", scene, *size)
+        self.assertEqual(self.pixels("s_0001.png"), self.pixels("one.png"))
+        self.assertNotEqual(self.pixels("s_0002.png"), self.pixels("one.png"))
+        self.reject(2, "--frames 2", "render", self.vdb, other, "-o", "s.png", "--frames", "3")
+        self.reject(2, "missing.vdb", "render", self.vdb, "missing.vdb", "-o", "s.png", "--scene", scene, *size)
+        result = self.run_tessera("render", self.vdb, other, "-o", "s.png", *size)
+        self.assertIn("transfer_function.range", result.stderr)
+
     def test_a_picture_goes_to_standard_output(self):
         command = [TESSERA, "render", self.vdb, "-o", "-", "--size", "400x320", "--quiet"]
         result = subprocess.run(command, capture_output=True, check=True, timeout=300)

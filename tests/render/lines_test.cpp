@@ -246,6 +246,24 @@ TEST_F(Lines, AxesHaveRoundNumbersAtTheOutline) {
     const PictureLines askew = linesOf(std::vector{axesEffect({})}, {options.camera, options.boundsWorld});
     for (const char* name : {"x", "y", "z"})
         EXPECT_EQ(std::ranges::count(askew.marks.words, name, &PictureWords::text), 1);
+    // Of axes that are level in the picture the lower edge has them, though some edge may look upright.
+    int level = 0;
+    for (int n = 0; n < 72; ++n) {
+        const double angle = n * std::numbers::pi / 36;
+        const Vec3d middle(0.48, 0.5, 0);
+        options.camera = lookAt(middle + 3.0 * Vec3d(std::cos(angle), std::sin(angle), 0.3), middle, 400);
+        const CameraView view = viewOf(options.camera);
+        const PictureLines turned =
+            linesOf(std::vector{axesEffect({})}, {options.camera, options.boundsWorld});
+        for (const PictureWords& words : turned.marks.words)
+            for (int axis = 0; axis < 2; ++axis) {
+                if (words.text != (axis == 0 ? "x" : "y")) continue;
+                if (std::abs(view.right[axis]) < 1.5 * std::abs(view.up[axis])) continue;
+                EXPECT_GT(words.placePixels[1], 200) << n;
+                ++level;
+            }
+    }
+    EXPECT_GT(level, 72);
     // From inside there is the box alone.
     options.camera = lookAt({0.5, 0.5, 0}, {1, 1, 0.3}, 400, 80);
     const PictureLines inside = linesOf(std::vector{axesEffect({})}, {options.camera, options.boundsWorld});

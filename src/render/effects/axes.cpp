@@ -34,6 +34,7 @@ class AxesLines {
         dot_ = lines_.marks.dotPixels;
         for (int axis = 0; axis < 3; ++axis) {
             std::optional<Edge> best;
+            const bool isUpright = isSteep(axis);
             for (int n = 0; n < 4; ++n) {
                 Edge edge{axis, {}};
                 const int b = (axis + 1) % 3, c = (axis + 2) % 3;
@@ -42,7 +43,7 @@ class AxesLines {
                 addLine(placeAt(edge, 0), placeAt(edge, 1));
                 if (isFront(b, n % 2) == isFront(c, n / 2)) continue;  // within the box's outline, or behind
                 if (!pixelsOf(placeAt(edge, 0)) || !pixelsOf(placeAt(edge, 1))) continue;
-                if (!best || rankOf(edge) > rankOf(*best)) best = edge;
+                if (!best || rankOf(edge, isUpright) > rankOf(*best, isUpright)) best = edge;
             }
             if (best) addTicks(*best);
         }
@@ -73,13 +74,21 @@ class AxesLines {
         return Pixels((glm::dot(d, camera_.right) / (away * camera_.wide) + 1) / 2 * view_.camera.widthPixels,
                       (1 - glm::dot(d, camera_.up) / (away * camera_.high)) / 2 * view_.camera.heightPixels);
     }
-    /// Lower edges, or those further on the left, rank higher; first of all those whose middle is seen.
-    double rankOf(const Edge& edge) const {
-        const Pixels from = *pixelsOf(placeAt(edge, 0)), to = *pixelsOf(placeAt(edge, 1));
-        const Pixels middle = 0.5 * (from + to), along = glm::abs(to - from);
+    /// Lower edges rank higher, or of a steep axis those further on the left; first of all those whose middle
+    /// is seen.
+    double rankOf(const Edge& edge, bool isSteep) const {
+        const Pixels middle = 0.5 * (*pixelsOf(placeAt(edge, 0)) + *pixelsOf(placeAt(edge, 1)));
         const double wide = view_.camera.widthPixels, high = view_.camera.heightPixels;
         const bool isSeen = middle.x > 0 && middle.y > 0 && middle.x < wide && middle.y < high;
-        return (isSeen ? 1e6 : 0) + (along.y > along.x ? -middle.x : middle.y);
+        return (isSeen ? 1e6 : 0) + (isSteep ? -middle.x : middle.y);
+    }
+    /// Whether an axis through the middle of the box is more upright than level in the picture.
+    bool isSteep(int axis) const {
+        Vec3d from = 0.5 * (box_.min + box_.max), to = from;
+        from[axis] = box_.min[axis];
+        to[axis] = box_.max[axis];
+        const auto a = pixelsOf(from), b = pixelsOf(to);
+        return a && b && std::abs(b->y - a->y) > std::abs(b->x - a->x);
     }
     void addLine(const Vec3d& from, const Vec3d& to) {
         lines_.segments.push_back({from, to, axes_.color, axes_.widthPixels});
