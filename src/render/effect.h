@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 #include "gl/shader_text.h"
 #include "mesh/field_range.h"
 #include "render/picture_lines.h"
+#include "render/placed_bricks.h"
 #include "tessera/focus.h"
 #include "tessera/transfer_function.h"
 #include "tessera/vec.h"
@@ -23,7 +25,10 @@ struct EffectScene {
     const GlProgram& program;
     const ValueCoding& coding;  ///< of the channel shown
     ValueRange range;           ///< of that channel in all bricks
-    double sizeWorld = 0;       ///< the longest side of the bricks' box
+    Box3d boxWorld;             ///< of all bricks
+    BrickFrame frame;
+    double finestSpacingWorld = 0;  ///< of these bricks
+    double layerWorld = 1;          ///< as RenderOptions has it
     /// Of a pixel: its opening in radians, or with parallel rays its width in world units.
     double pixelSize = 0;
     Vec3d eyeWorld{0};  ///< places in shaders are relative to it
@@ -44,8 +49,17 @@ struct EffectScene {
     std::array<float, 4> planeFromEye(const HalfSpace& half) const;
 };
 
+class EffectPass;
+
+/// A texture that an effect's shader reads.
+struct EffectTexture {
+    const char* sampler = "";  ///< the name in the shader
+    GlTexture texture;
+    std::int64_t bytes = 0;
+};
+
 /// Something that a picture shows beside the volume itself. The shader is put together from the effects that
-/// a picture names, so one that it doesn't name leaves no text there, no uniform and no buffer.
+/// a picture names, so one that it doesn't name leaves no text there, no uniform, no buffer and no pass.
 ///
 /// An effect is a file of GLSL and one of C++ in render/effects. The GLSL has functions for some of the
 /// places named here; shaders/brick_fragment.glsl calls them. `local` is a place in the brick, in voxels;
@@ -53,6 +67,8 @@ struct EffectScene {
 struct Effect {
     std::string name;               ///< as scenes write it
     std::vector<ShaderText> texts;  ///< in the order needed; one that effects share stands in the shader once
+    /// What `hide` needs, of `texts`. It can do without a brick.
+    std::vector<ShaderText> hideTexts;
     /// void f(inout vec4 shown, vec3 local, vec3 direction): a sample of the volume that is seen, its colour
     /// and opacity.
     std::string shade;
@@ -77,6 +93,9 @@ struct Effect {
     bool needsBrickNumbers = false;  ///< RenderOptions::brickNumbers
     bool readsIndex = false;         ///< needs the pool's index of bricks
     std::function<void(const EffectScene&)> setUniforms;  ///< none: it has none
+    /// Makes textures for a picture before it is drawn, by passes of its own, on the OpenGL thread. None: it
+    /// needs none.
+    std::function<std::vector<EffectTexture>(EffectPass&)> makeTextures;
     /// Lines in the volume, and marks on the picture. An effect may have nothing else.
     std::function<PictureLines(const LineView&)> lines;
     /// Of the picture's width and height, on each side: what a camera that is to be found leaves for it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -10,6 +11,8 @@
 #include "gl/gl_program.h"
 #include "refine/camera_view.h"
 #include "refine/wishes.h"
+#include "render/effect_hooks.h"
+#include "render/effect_pass.h"
 #include "render/line_pass.h"
 #include "render/shaders.h"
 #include "render/visibility_order.h"
@@ -25,6 +28,8 @@ constexpr std::size_t kMostClips = 32;
 /// Pixels are closed after so many parts of the bricks.
 constexpr std::size_t kParts = 12;
 constexpr std::size_t kFewBricks = 64;
+/// Texture units from here on are those of effects; a pool's and the lines' come before.
+constexpr GLuint kEffectUnits = 5;
 /// In sizes of the data.
 constexpr double kFarthest = 1e6;
 
@@ -45,7 +50,8 @@ struct DeviceBrick {
 struct DeviceStop {
     std::array<float, 4> shown;
     float code;
-    std::array<float, 3> padding;
+    float depth;  // see effects/depth.glsl
+    std::array<float, 2> padding;
 };
 
 /// Bricks of one atlas that follow each other.
@@ -56,6 +62,16 @@ struct Run {
 
 std::array<float, 3> floats(const Vec3d& v) {
     return {float(v.x), float(v.y), float(v.z)};
+}
+
+/// The mean of -ln(1 - a) for opacities a from one to another, as effects/depth.glsl has it; a lot, but not
+/// without end, where both are 1.
+double meanDepth(double one, double other) {
+    const double u = 1 - one, v = 1 - other;
+    constexpr double kMost = 100;
+    if (std::abs(u - v) < 1e-6) return std::min(-std::log(0.5 * (u + v)), kMost);
+    const auto integral = [](double x) { return x > 0 ? x - x * std::log(x) : 0; };
+    return (integral(u) - integral(v)) / (u - v);
 }
 
 /// What the picture's camera looks like from the bricks.
@@ -75,6 +91,7 @@ class Scene {
             const Box3d box = frame.boxWorld(brick.key);
             box_.include(box.min);
             box_.include(box.max);
+            finestSpacing_ = std::min(finestSpacing_, frame.spacingWorld(brick.key.depth));
             if (brick.range.empty() || !options.values.empty()) continue;
             range_.min = std::min(range_.min, brick.range.min);
             range_.max = std::max(range_.max, brick.range.max);
@@ -154,6 +171,7 @@ class Scene {
             stops.push_back(
                 {{float(stop.color[0]), float(stop.color[1]), float(stop.color[2]), float(stop.opacity)},
                  float(coding.encode(value)),
+                 0,
                  {}});
         };
         const auto& all = options_.function.stops;
@@ -172,16 +190,24 @@ class Scene {
                 add(all[i], value);
             }
         }
+        double depth = 0;
+        for (std::size_t i = 1; i < stops.size(); ++i) {
+            depth += double(stops[i].code - stops[i - 1].code) *
+                     meanDepth(double(stops[i - 1].shown[3]), double(stops[i].shown[3]));
+            stops[i].depth = float(depth);
+        }
         return stops;
     }
 
     EffectScene forEffects(const GlFunctions& gl, const GlProgram& program) const {
-        const Vec3d size = box_.size();
         return {gl,
                 program,
                 pool_.coding().codings()[std::size_t(options_.channel)],
                 range_,
-                std::max({size.x, size.y, size.z}),
+                box_,
+                frame_,
+                finestSpacing_,
+                options_.layerWorld,
                 pixelSize(),
                 eye_,
                 options_.function,
@@ -220,7 +246,8 @@ class Scene {
     Vec3d eye_;
     std::vector<HalfSpace> seen_;  // relative to the eye
     bool needsAll_ = false;
-    Box3d box_;         // of all bricks
+    Box3d box_;  // of all bricks
+    double finestSpacing_ = std::numeric_limits<double>::infinity();
     ValueRange range_;  // likewise
 };
 
@@ -302,8 +329,9 @@ PictureLines linesOf(std::span<const Effect> effects, const LineView& view) {
 
 // All that OpenGL has; only its thread looks at it.
 struct SliceRenderer::Device {
-    std::map<std::string, GlProgram> programs;  // by cells and effects
-    const GlProgram* bricks = nullptr;          // of the picture
+    std::map<std::string, GlProgram> programs;      // by cells and effects
+    std::map<std::string, GlProgram> passPrograms;  // of effects
+    const GlProgram* bricks = nullptr;              // of the picture
     std::optional<GlProgram> close;
     GlVertexArray vertices;
     GlTexture color, depth;
@@ -316,66 +344,11 @@ struct SliceRenderer::Device {
                                bool hasLines);
     void setUniforms(const GlFunctions& gl, const Scene& scene, const BrickPool& pool,
                      const RenderOptions& options) const;
+    void bindTextures(const GlFunctions& gl, std::span<const EffectTexture> textures) const;
     void draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs, std::size_t brickCount,
               const PictureTile& tile, const Vec3i& picture, std::size_t group, bool hasLines,
               RenderCounts& counts) const;
 };
-
-/// Text of a function that calls those of all effects; none, and no define, where no effect has one.
-struct Hook {
-    const char* define;
-    std::string Effect::*function;
-    const char* head;    // of the function
-    const char* first;   // what stands before the calls,
-    const char* before;  // before the name of each,
-    const char* behind;  // behind it,
-    const char* last;    // and behind them all
-};
-
-constexpr const char* kSum = "    vec4 sum = vec4(0);\n";
-constexpr const char* kAdd = "    sum += (1.0 - sum.a) * ";
-constexpr const char* kReturnSum = "    return sum;\n";
-
-constexpr Hook kHooks[] = {
-    {"SHADE", &Effect::shade, "void shadeByEffects(inout vec4 shown, vec3 local, vec3 direction)", "", "    ",
-     "(shown, local, direction);\n", ""},
-    {"SHEET", &Effect::sheet,
-     "vec4 sheetByEffects(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction)", kSum, kAdd,
-     "(codeBegin, codeEnd, begin, end, direction);\n", kReturnSum},
-    {"FACE", &Effect::face, "vec4 faceByEffects(vec3 local)", kSum, kAdd, "(local);\n", kReturnSum},
-    {"CLASSIFY", &Effect::classify,
-     "vec4 classifyByEffects(float codeBegin, float codeEnd, float layers, out float share)", "",
-     "    return ", "(codeBegin, codeEnd, layers, share);\n", ""},
-    {"SURFACE", &Effect::surfaceDistance, "float surfaceBehind(vec3 origin, vec3 direction, float after)",
-     "    float next = 1e38;\n", "    next = min(next, ", "(origin, direction, after));\n",
-     "    return next;\n"},
-    {"SURFACE", &Effect::surface, "vec4 surfaceByEffects(vec3 local, vec3 origin, vec3 direction, float at)",
-     kSum, kAdd, "(local, origin, direction, at);\n", kReturnSum},
-    {"HIDE", &Effect::hide, "bool isHiddenByEffects(vec3 origin, vec3 direction, float at)", "", "    if (",
-     "(origin, direction, at)) return true;\n", "    return false;\n"},
-};
-
-/// The functions of all hooks that some effect has, and before them the names of all, for effects that ask
-/// others.
-struct HookTexts {
-    std::string heads, functions;
-    std::vector<ShaderDefine> defines;
-};
-
-HookTexts hookTextsOf(std::span<const Effect> effects) {
-    HookTexts texts;
-    for (const Hook& hook : kHooks) {
-        std::string calls;
-        for (const Effect& effect : effects)
-            if (const std::string& function = effect.*hook.function; !function.empty())
-                calls += hook.before + function + hook.behind;
-        if (calls.empty()) continue;
-        texts.defines.push_back({hook.define});
-        texts.heads += std::string(hook.head) + ";\n";
-        texts.functions += std::string(hook.head) + " {\n" + hook.first + calls + hook.last + "}\n";
-    }
-    return texts;
-}
 
 const GlProgram& SliceRenderer::Device::programOf(GlContext& context, int brickCells,
                                                   std::span<const Effect> effects, bool hasLines) {
@@ -445,17 +418,20 @@ void SliceRenderer::Device::setUniforms(const GlFunctions& gl, const Scene& scen
     known.set("right", view.wide * view.right);
     known.set("up", view.high * view.up);
     known.set("isParallel", int(view.isParallel));
-    known.set("component", options.channel % int(kChannelsAGroup));
-    std::vector<std::array<float, 4>> clips;
-    for (const HalfSpace& half : options.within) clips.push_back(known.planeFromEye(half));
-    known.set("clipCount", int(clips.size()));
-    if (!clips.empty()) known.set("clips", clips);
+    setPoolUniforms(known, pool, options.within, options.channel);
     known.set("slicesAVoxel", options.slicesAVoxel);
     known.set("layersAWorldUnit", 1 / options.layerWorld);
-    const Vec3i& slots = pool.layout().slots;
-    gl.ProgramUniform3i(bricks->id(), bricks->uniform("slotsAlong"), slots.x, slots.y, slots.z);
     for (const Effect& effect : options.effects)
         if (effect.setUniforms) effect.setUniforms(known);
+}
+
+void SliceRenderer::Device::bindTextures(const GlFunctions& gl,
+                                         std::span<const EffectTexture> textures) const {
+    GLuint unit = kEffectUnits;
+    for (const EffectTexture& texture : textures) {
+        gl.ProgramUniform1i(bricks->id(), bricks->uniform(texture.sampler), GLint(unit));
+        gl.BindTextureUnit(unit++, texture.texture.id());
+    }
 }
 
 void SliceRenderer::Device::draw(GlContext& context, const BrickPool& pool, std::span<const Run> runs,
@@ -577,9 +553,15 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     // In tasks of a tile, so that others of the thread come between.
     struct Uploaded {
         GlBuffer bricks, stops;
+        std::vector<EffectTexture> textures;
     };
     const std::shared_ptr<Uploaded> uploaded(new Uploaded,
                                              [this](Uploaded* buffers) { thread_.dispose(buffers); });
+    const auto bindBuffers = [&](const GlFunctions& gl) {
+        if (state.index) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, state.index->id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, uploaded->bricks.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, uploaded->stops.id());
+    };
     thread_.run([&](GlContext& context) {
         device_->prepare(context, pool.brickCells(), options.effects, hasLines);
         if (hasLines) device_->lines->take(context, lines, scene.view(), scene.raySize());
@@ -589,6 +571,28 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
                             std::int64_t(kTile) * kTile * std::int64_t(sizeof(Rgba) + sizeof(float)) +
                             (hasLines ? device_->lines->deviceBytes() : 0);
     });
+    for (const Effect& effect : options.effects) {
+        if (!effect.makeTextures) continue;
+        execution.throwIfCancelled();
+        thread_.run([&](GlContext& context) {
+            const GlFunctions& gl = context.functions();
+            const Timer timer;
+            bindBuffers(gl);
+            EffectPass pass({context, pool, options.effects, options.within, options.channel,
+                             [&](const GlProgram& program) { return scene.forEffects(gl, program); },
+                             device_->passPrograms});
+            EffectResources& made = count.effects.emplace_back();
+            made.name = effect.name;
+            for (EffectTexture& texture : effect.makeTextures(pass)) {
+                ++made.textures;
+                made.bytes += texture.bytes;
+                uploaded->textures.push_back(std::move(texture));
+            }
+            made.passes = pass.passes();
+            count.deviceBytes += made.bytes;
+            count.drawMs += timer.elapsedMs();
+        });
+    }
     for (int top = 0; top < image.height; top += pixelsATile)
         for (int left = 0; left < image.width; left += pixelsATile) {
             if (options.beforeTile) options.beforeTile();
@@ -605,9 +609,8 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
                     ++count.draws;
                 }
                 device_->setUniforms(gl, scene, pool, options);
-                if (state.index) gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, state.index->id());
-                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, uploaded->bricks.id());
-                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, uploaded->stops.id());
+                bindBuffers(gl);
+                device_->bindTextures(gl, uploaded->textures);
                 device_->draw(context, pool, runs, placed.size(), tile, picture, group, hasLines, count);
                 gl.GetTextureSubImage(device_->color.id(), 0, 0, 0, 0, tile.width, tile.height, 1, GL_RGBA,
                                       GL_FLOAT, GLsizei(rays.size() * sizeof(Rgba)), rays.data());

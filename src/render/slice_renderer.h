@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/rgba_image.h"
@@ -46,12 +47,20 @@ struct RenderOptions {
 /// Of those that are known; 0 without any.
 double largestOf(std::span<const float> brickNumbers);
 
+/// What an effect makes for a picture on the device.
+struct EffectResources {
+    std::string name;
+    int passes = 0, textures = 0;
+    std::int64_t bytes = 0;
+};
+
 struct RenderCounts {
     std::int64_t bricks = 0;        ///< drawn
     std::int64_t unseenBricks = 0;  ///< left out: beside the picture, or nothing of them is shown
     std::int64_t draws = 0;
-    std::int64_t deviceBytes = 0;  ///< beside the pool
-    double drawMs = 0;             ///< until the picture is read back
+    std::int64_t deviceBytes = 0;          ///< beside the pool
+    std::vector<EffectResources> effects;  ///< of those that make any
+    double drawMs = 0;                     ///< until the picture is read back
 };
 
 /// Draws the bricks of a pool by slices across the view, composited from the front to the back.

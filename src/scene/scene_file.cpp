@@ -8,10 +8,12 @@
 #include "render/effects/cuts.h"
 #include "render/effects/errors.h"
 #include "render/effects/isosurfaces.h"
+#include "render/effects/occlusion.h"
 #include "render/effects/preintegration.h"
 #include "render/effects/probes.h"
 #include "render/effects/scale_bar.h"
 #include "render/effects/shading.h"
+#include "render/effects/shadows.h"
 #include "scene/colour_maps.h"
 #include "tessera/error.h"
 
@@ -297,6 +299,25 @@ Effect readProbes(const JsonNode& json) {
     }
 }
 
+Effect readOcclusion(const JsonNode& json) {
+    json.expectKeys({"radius", "voxels", "strength"});
+    refuseBoth(json, "voxels", "radius");
+    Occlusion occlusion;
+    if (const auto radius = json.find("radius")) occlusion.radiusWorld = radius->length();
+    if (const auto voxels = json.find("voxels")) occlusion.radiusVoxels = voxels->number(0.5, 64);
+    occlusion.strength = readShare(json, "strength", occlusion.strength);
+    return occlusionEffect(occlusion);
+}
+
+Effect readShadows(const JsonNode& json) {
+    json.expectKeys({"light", "strength", "resolution"});
+    Shadows shadows;
+    shadows.towardsLight = readDirection(json.at("light"));
+    shadows.strength = readShare(json, "strength", shadows.strength);
+    if (const auto resolution = json.find("resolution")) shadows.resolution = resolution->whole(8, 512);
+    return shadowsEffect(shadows);
+}
+
 Effect readPreintegration(const JsonNode& json) {
     json.expectKeys({});
     return preintegrationEffect();
@@ -354,8 +375,8 @@ SceneOutline readOutline(const JsonNode& json, const Scene& scene) {
 
 /// @param scene what is read already.
 std::vector<Effect> readEffects(const JsonNode& json, Scene& scene) {
-    json.expectKeys({"axes", "bricks", "cuts", "errors", "isosurfaces", "outline", "preintegration", "probes",
-                     "scale_bar", "shading"});
+    json.expectKeys({"axes", "bricks", "cuts", "errors", "isosurfaces", "occlusion", "outline",
+                     "preintegration", "probes", "scale_bar", "shading", "shadows"});
     std::vector<Effect> effects;
     if (const auto axes = json.find("axes")) effects.push_back(readAxes(*axes, scene));
     if (const auto bricks = json.find("bricks")) effects.push_back(readBrickEdges(*bricks));
@@ -371,6 +392,8 @@ std::vector<Effect> readEffects(const JsonNode& json, Scene& scene) {
     if (const auto probes = json.find("probes")) effects.push_back(readProbes(*probes));
     if (const auto bar = json.find("scale_bar")) effects.push_back(readScaleBar(*bar, scene));
     if (const auto shading = json.find("shading")) effects.push_back(readShading(*shading));
+    if (const auto occlusion = json.find("occlusion")) effects.push_back(readOcclusion(*occlusion));
+    if (const auto shadows = json.find("shadows")) effects.push_back(readShadows(*shadows));
     return effects;
 }
 

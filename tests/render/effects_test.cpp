@@ -16,9 +16,11 @@
 #include "render/effects/cuts.h"
 #include "render/effects/errors.h"
 #include "render/effects/isosurfaces.h"
+#include "render/effects/occlusion.h"
 #include "render/effects/preintegration.h"
 #include "render/effects/probes.h"
 #include "render/effects/shading.h"
+#include "render/effects/shadows.h"
 #include "schedule/random_schedule.h"
 #include "tessera/error.h"
 
@@ -415,6 +417,116 @@ TEST_F(Effects, ProbesTakeAwayWhatTheyHoldAndShowTheFieldWhereTheyCut) {
                  InputError);
 }
 
+/// The cube less a box: there are faces, edges and a hollow.
+class HollowEffects : public Effects {
+  protected:
+    static constexpr Box3d kGone{{0.4, -1, 0.5}, {2, 0.6, 2}};
+    static bool isSolid(const Vec3d& p) {
+        return glm::all(glm::greaterThan(p, Vec3d(0.001))) && glm::all(glm::lessThan(p, Vec3d(0.999))) &&
+               !(glm::all(glm::greaterThan(p, kGone.min)) && glm::all(glm::lessThan(p, kGone.max)));
+    }
+    static Effect hollow() {
+        return probesEffect({.shape = {.kind = ProbeShape::box, .boxWorld = kGone}, .opacity = 0});
+    }
+};
+
+TEST_F(HollowEffects, OcclusionDarkensHollowsAndNoPlanes) {
+    options.function = even(0.99);
+    options.layerWorld = 0.003;
+    options.slicesAVoxel = 8;
+    options.camera.widthPixels = options.camera.heightPixels = 72;
+    const Occlusion occlusion{.radiusWorld = 0.3, .strength = 0.9};
+    options.effects = {hollow(), occlusionEffect(occlusion)};
+    const RgbaImage image = pictured->draw(options);
+    keep("occlusion", "hollow", image);
+    const Vec3d halfOfThem[] = {{-0.216934, 0.219289, 0.951237}, {0.501343, -0.506785, 0.701302},
+                                {-0.207349, 0.957142, 0.202202}, {-0.954848, 0.217670, 0.202202},
+                                {0.692626, 0.509404, 0.510663},  {-0.516852, -0.687086, 0.510663}};
+    const CameraView view = viewOf(options.camera);
+    int plain = 0, dark = 0;
+    double worst = 0;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x) {
+            const ViewRay ray = view.rayOf(options.camera, x, y);
+            double at = 0;
+            while (at < 6 && !isSolid(ray.originWorld + at * ray.direction)) at += 0.001;
+            if (at >= 6 || !isSolid(ray.originWorld + (at + 0.02) * ray.direction)) continue;
+            const Vec3d p = ray.originWorld + at * ray.direction;
+            double passed = 0;
+            bool isSure = true;
+            for (const Vec3d& half : halfOfThem)
+                for (const double sign : {-1.0, 1.0}) {
+                    double cover = 0;
+                    for (const double share : {0.5, 1.0}) {
+                        const Vec3d there = p + sign * share * *occlusion.radiusWorld * half;
+                        cover += isSolid(there) ? 0.5 : 0;
+                        for (int corner = 0; corner < 8; ++corner) {
+                            const Vec3d aside(corner & 1, corner >> 1 & 1, corner >> 2);
+                            isSure = isSure && isSolid(there + 0.012 * (2.0 * aside - 1.0)) == isSolid(there);
+                        }
+                    }
+                    passed += 1 - cover;
+                }
+            if (!isSure) continue;
+            const double factor = 1 - occlusion.strength * std::max(1 - passed / 6, 0.0);
+            worst = std::max(worst, std::abs(double(image.at(x, y)[0]) - factor));
+            (factor < 0.9 ? dark : plain) += 1;
+        }
+    EXPECT_LT(worst, 1.0 / 255) << "on bricks of all levels";
+    EXPECT_GT(plain, 200);
+    EXPECT_GT(dark, 50);
+}
+
+TEST_F(HollowEffects, ShadowsAreWhatTheLightsWayThroughTheVolumeLeaves) {
+    options.camera.widthPixels = options.camera.heightPixels = 24;
+    Shadows shadows{.towardsLight = {1, -1, 2}, .strength = 1};
+    const Vec3d light = glm::normalize(shadows.towardsLight);
+    constexpr double kStep = 0.01;
+    const auto passedOver = [&](double length) { return std::pow(0.7, length / options.layerWorld); };
+    const CameraView view = viewOf(options.camera);
+    RgbaImage expected{options.camera.widthPixels, options.camera.heightPixels, {}};
+    for (int y = 0; y < expected.height; ++y)
+        for (int x = 0; x < expected.width; ++x) {
+            const ViewRay ray = view.rayOf(options.camera, x, y);
+            double left = 1, sum = 0;
+            for (double at = 0.5 * kStep; at < 6; at += kStep) {
+                const Vec3d p = ray.originWorld + at * ray.direction;
+                if (!isSolid(p)) continue;
+                double way = 0;
+                for (double along = 0.5 * kStep; along < 1.5; along += kStep)
+                    way += isSolid(p + along * light) ? kStep : 0;
+                const double passed = passedOver(kStep);
+                sum += left * (1 - passed) * passedOver(way);
+                left *= passed;
+            }
+            expected.pixels.push_back({float(sum), float(sum / 2), float(sum / 4), float(1 - left)});
+        }
+    // Light is looked up some cells nearer to its source and to the eye, so it is right where cells are
+    // small.
+    double rms[2];
+    for (const int finer : {0, 1}) {
+        shadows.resolution = finer == 0 ? 96 : 192;
+        options.effects = {hollow(), shadowsEffect(shadows)};
+        RenderCounts counts;
+        const RgbaImage image = pictured->draw(options, &counts);
+        keep("shadows", finer == 0 ? "96" : "192", image);
+        ASSERT_EQ(counts.effects.size(), 1u);
+        EXPECT_EQ(counts.effects[0].name, "shadows");
+        EXPECT_EQ(counts.effects[0].textures, 1);
+        EXPECT_EQ(counts.effects[0].passes, 2 + pictured->pool->layout().atlases);
+        EXPECT_GT(counts.effects[0].bytes, 4 * std::pow(shadows.resolution, 3) / 2);
+        const ImageDifference apart = differenceOf(image, expected);
+        rms[finer] = 255 * apart.rms(std::int64_t(image.pixels.size()));
+        std::printf("shadows, %d cells: RMS %.2f, largest %.2f of 255 from light by small steps\n",
+                    shadows.resolution, rms[finer], 255 * apart.largest);
+        EXPECT_LT(255 * apart.largest, finer == 0 ? 20 : 10);
+    }
+    EXPECT_LT(rms[1], 4);
+    EXPECT_LT(rms[1], 0.6 * rms[0]);
+    EXPECT_THROW(shadowsEffect({.towardsLight = Vec3d(0)}), InputError);
+    EXPECT_THROW(shadowsEffect({.resolution = 4}), InputError);
+}
+
 TEST_F(Effects, EdgesOfBricksStandWhereTheyAre) {
     options.within.clear();
     options.function = even(0);
@@ -511,8 +623,10 @@ std::vector<Effect> everyEffect() {
             errorsEffect({}),
             isosurfacesEffect({{.value = 0.6}}),
             preintegrationEffect(),
+            occlusionEffect({}),
             probesEffect({}),
-            shadingEffect({})};
+            shadingEffect({}),
+            shadowsEffect({})};
 }
 
 /// All that OpenGL is asked for, while pictures are drawn.
@@ -576,7 +690,9 @@ TEST_F(EffectCalls, AShaderHasTheTextsOfItsEffectsAlone) {
         const GlCalls calls = drawnBy(renderer, {effect});
         const auto holds = [&](const ShaderText& text) {
             return std::ranges::any_of(calls.texts, [&](const std::string& shader) {
-                return shader.find(text.text) != std::string::npos;
+                // Passes of an effect's own take what they need.
+                return shader.find("local_size_x") == std::string::npos &&
+                       shader.find(text.text) != std::string::npos;
             });
         };
         for (const Effect& other : all)

@@ -53,6 +53,8 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
         "clip": {"box": [0, 1, 2, 3, 4, 5], "planes": [{"normal": [0, 0, 2], "offset": 3}]},
         "length_unit": "mm",
         "effects": {"errors": {"bound": 0.01}, "outline": {"mesh": "wing.vtu", "angle": 45}, "axes": {}, "scale_bar": {}, "shading": {"light": [0, 0, 3], "specular": 0}, "bricks": {}, "preintegration": {},
+                    "occlusion": {"voxels": 4, "strength": 0.5},
+                    "shadows": {"light": [0, 0, 2], "strength": 0.5, "resolution": 64},
                     "cuts": {"planes": [{"normal": [0, 0, 2], "offset": 3, "opacity": 0.5}],
                              "contours": {"values": [1, 2], "width": 2, "color": [1, 1, 1]}},
                     "probes": {"shapes": [{"difference": [{"box": [0, 0, 0, 1, 1, 1]},
@@ -88,7 +90,8 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     std::vector<std::string> names;
     for (const Effect& effect : scene.effects) names.push_back(effect.name);
     EXPECT_EQ(names, (std::vector<std::string>{"axes", "bricks", "cuts", "errors", "isosurfaces", "outline",
-                                               "preintegration", "probes", "scale_bar", "shading"}));
+                                               "preintegration", "probes", "scale_bar", "shading",
+                                               "occlusion", "shadows"}));
     EXPECT_EQ(scene.outline.mesh, path().substr(0, path().rfind('/') + 1) + "wing.vtu");
     EXPECT_EQ(scene.outline.shown.leastDegrees, 45);
     // Units are in what effects write.
@@ -155,6 +158,13 @@ TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
         {R"({"version": 1, "effects": {"errors": {"bound": 0.01}, "outline": {"mesh": ""}}})",
          "effects.outline.mesh: expected the name of a file"},
         {R"({"version": 1, "length_unit": 1})", "length_unit: expected a text"},
+        {R"({"version": 1, "effects": {"occlusion": {"radius": 1, "voxels": 4}}})",
+         "effects.occlusion.voxels: can't stand beside radius"},
+        {R"({"version": 1, "effects": {"occlusion": {"radius": 0}}})",
+         "effects.occlusion.radius: expected a number above 0"},
+        {R"({"version": 1, "effects": {"shadows": {}}})", "effects.shadows.light: expected"},
+        {R"({"version": 1, "effects": {"shadows": {"light": [0, 0, 1], "resolution": 1000}}})",
+         "effects.shadows.resolution: expected a whole number from 8 to 512"},
         {R"({"version": 1, "effects": {"preintegration": {"table": 2}}})",
          "effects.preintegration: unknown key \"table\"; it knows none"},
         {R"({"version": 1, "effects": {"cuts": {"planes": []}}})",

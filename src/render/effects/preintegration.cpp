@@ -7,7 +7,7 @@ namespace tessera {
 Effect preintegrationEffect() {
     Effect effect;
     effect.name = "preintegration";
-    effect.texts = {shaders::render::kPreintegration};
+    effect.texts = {shaders::render::kDepth, shaders::render::kPreintegration};
     effect.classify = "preintegrationClassify";
     return effect;
 }

@@ -2,18 +2,6 @@
 // opacity a stops -ln(1 - a) of the light's logarithm. That has a closed integral where a is linear, so the
 // opacity is exact whatever stops lie between the ends. Colours are met in their order.
 
-// The mean of -ln(1 - a) for a from one opacity to another; a lot where both are 1.
-float meanDepth(float one, float other) {
-    float u = 1.0 - one, v = 1.0 - other;
-    float middle = 0.5 * (u + v), half_ = 0.5 * (u - v);
-    if (middle <= 0.0) return 1e30;
-    float r = half_ / middle, square = r * r;
-    // The integral of -ln u is u - u ln u; close ends cancel there, so in a series.
-    if (square < 0.09) return -log(middle) + square * (1.0 / 6.0 + square * (1.0 / 20.0 + square / 42.0));
-    float atU = u > 0.0 ? u * log(u) : 0.0, atV = v > 0.0 ? v * log(v) : 0.0;
-    return 1.0 - (atU - atV) / (u - v);
-}
-
 // Where in a slab its light comes from: opacities at its ends, and its depth.
 float shareSeen(float one, float other, float depth) {
     float even = one + other > 0.0 ? (one + 2.0 * other) / (3.0 * (one + other)) : 0.5;

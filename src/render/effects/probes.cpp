@@ -38,7 +38,8 @@ Effect probesEffect(const Probes& probes) {
     namespace text = shaders::render;
     Effect effect;
     effect.name = "probes";
-    effect.texts = {text::kLight, text::kProbes};
+    effect.texts = {text::kProbeShapes, text::kLight, text::kProbes};
+    effect.hideTexts = {text::kProbeShapes};
     effect.surfaceDistance = "probesDistance";
     effect.surface = "probesSurface";
     effect.hide = "probesHide";

@@ -1,5 +1,7 @@
 #include "render/effects/shading.h"
 
+#include <algorithm>
+
 #include "render/shaders.h"
 
 namespace tessera {
@@ -23,8 +25,9 @@ Effect shadingEffect(const Shading& shading) {
         const std::array<float, 4> weights{float(shading.ambient), float(shading.diffuse),
                                            float(shading.specular), float(shading.shininess)};
         scene.set("shadingWeights", std::span(&weights, 1));
+        const Vec3d size = scene.boxWorld.size();
         const double codes = scene.coding.encode(scene.range.max) - scene.coding.encode(scene.range.min);
-        scene.set("shadingEven", codes / (kEvenSizes * scene.sizeWorld));
+        scene.set("shadingEven", codes / (kEvenSizes * std::max({size.x, size.y, size.z})));
     };
     return effect;
 }

@@ -2,7 +2,8 @@
 struct Stop {
     vec4 shown;  // colour and opacity
     float code;
-    float padding[3];
+    float depth;  // of effects
+    float padding[2];
 };
 layout(std430, binding = 1) readonly buffer StopBlock { Stop stops[]; };
 
