@@ -239,7 +239,7 @@ ProbeShape readShape(const JsonNode& json) {
                                                                    {"sphere", ProbeShape::ball},
                                                                    {"box", ProbeShape::box},
                                                                    {"union", ProbeShape::unite},
-                                                                   {"intersection", ProbeShape::intersect},
+                                                                   {"intersection", ProbeShape::common},
                                                                    {"difference", ProbeShape::subtract}};
     json.expectKeys({"plane", "sphere", "box", "union", "intersection", "difference"});
     std::optional<ProbeShape> shape;

@@ -319,7 +319,7 @@ bool holds(const ProbeShape& shape, const Vec3d& p) {
                    glm::all(glm::lessThan(p, shape.boxWorld.max));
         case ProbeShape::unite:
             return std::ranges::any_of(shape.parts, has);
-        case ProbeShape::intersect:
+        case ProbeShape::common:
             return std::ranges::all_of(shape.parts, has);
         default:
             return has(shape.parts[0]) && std::none_of(shape.parts.begin() + 1, shape.parts.end(), has);
@@ -338,10 +338,10 @@ std::vector<Probes> probes() {
             {plane},
             {.shape = ball, .keepsInside = true},
             {combined(ProbeShape::unite, {ball, box})},
-            {combined(ProbeShape::intersect, {box, ball, plane})},
+            {combined(ProbeShape::common, {box, ball, plane})},
             {combined(ProbeShape::subtract, {box, ball})},
             {.shape = combined(ProbeShape::subtract, {ball, plane, box}), .keepsInside = true},
-            {combined(ProbeShape::unite, {combined(ProbeShape::intersect, {ball, plane}),
+            {combined(ProbeShape::unite, {combined(ProbeShape::common, {ball, plane}),
                                           combined(ProbeShape::subtract, {box, ball})})}};
 }
 

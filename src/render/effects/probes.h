@@ -10,7 +10,7 @@ namespace tessera {
 /// What a probe is made of: a shape, or a combination of others. (TetSplat of K. Museth and S. Lombeyda,
 /// 2004, has such probes.)
 struct ProbeShape {
-    enum Kind { plane, ball, box, unite, intersect, subtract };
+    enum Kind { plane, ball, box, unite, common, subtract };
     Kind kind = plane;
     HalfSpace half{};      ///< `plane`: what lies in the half-space
     Vec3d centerWorld{0};  ///< `ball`
