@@ -52,11 +52,13 @@ namespace {
 template <class Draw>
 std::vector<EffectCost> explainEffects(const RenderOptions& options, const RgbaImage& image,
                                        RenderCounts& whole, const Draw& draw) {
-    const auto fastest = [&](const RenderOptions& of, RgbaImage& drawn) {
+    const auto fastest = [&](RenderOptions of, RgbaImage& drawn) {
+        of.measuresDevice = true;
         RenderCounts counts, again;
         drawn = draw(of, counts);
         draw(of, again);
         counts.drawMs = std::min(counts.drawMs, again.drawMs);
+        counts.deviceMs = std::min(counts.deviceMs, again.deviceMs);
         return counts;
     };
     RgbaImage drawn;
@@ -69,7 +71,11 @@ std::vector<EffectCost> explainEffects(const RenderOptions& options, const RgbaI
         EffectCost& cost = costs.emplace_back();
         cost.name = options.effects[i].name;
         cost.drawMs = whole.drawMs - counts.drawMs;
+        cost.deviceMs = whole.deviceMs - counts.deviceMs;
         cost.bricks = whole.bricks - counts.bricks;
+        cost.passes = whole.passes - counts.passes;
+        cost.textures = whole.textures - counts.textures;
+        cost.deviceBytes = whole.deviceBytes - counts.deviceBytes;
         double squares = 0;
         for (std::size_t p = 0; p < image.pixels.size(); ++p)
             for (std::size_t c = 0; c < 3; ++c) {
@@ -83,12 +89,16 @@ std::vector<EffectCost> explainEffects(const RenderOptions& options, const RgbaI
 }
 
 std::string explanation(const RenderedPicture& picture, std::size_t width) {
-    TableRows rows{{"", "bricks", "ms", "changed pixels", "RMS of 255"}};
-    rows.push_back({"the picture", std::to_string(picture.counts.bricks),
-                    fmt::format("{:.1f}", picture.counts.drawMs), "", ""});
+    TableRows rows{{"", "bricks", "passes", "textures", "MB", "device ms", "pixels", "RMS"}};
+    const RenderCounts& all = picture.counts;
+    rows.push_back({"the picture", std::to_string(all.bricks), std::to_string(all.passes),
+                    std::to_string(all.textures), fmt::format("{:.1f}", 1e-6 * double(all.deviceBytes)),
+                    fmt::format("{:.1f}", all.deviceMs), "", ""});
     for (const EffectCost& effect : picture.effects)
         rows.push_back({"of it " + effect.name, fmt::format("{:+}", effect.bricks),
-                        fmt::format("{:+.1f}", effect.drawMs), std::to_string(effect.changesPixels),
+                        fmt::format("{:+}", effect.passes), fmt::format("{:+}", effect.textures),
+                        fmt::format("{:+.1f}", 1e-6 * double(effect.deviceBytes)),
+                        fmt::format("{:+.1f}", effect.deviceMs), std::to_string(effect.changesPixels),
                         fmt::format("{:.2f}", effect.changeRms)});
     return formatTable(rows, width) +
            fmt::format("device memory: bricks {:.1f} MB, picture {:.1f} MB; {} draw calls\n",
@@ -207,10 +217,17 @@ Json renderedJson(const RenderRequest& request, const RenderedPicture& picture) 
     json["device_bytes"] = {{"bricks", picture.poolBytes}, {"picture", picture.counts.deviceBytes}};
     json["draw_ms"] = picture.counts.drawMs;
     if (request.explains) {
+        json["device_ms"] = picture.counts.deviceMs;
+        json["passes"] = picture.counts.passes;
+        json["textures"] = picture.counts.textures;
         json["effects"] = Json::array();
         for (const EffectCost& effect : picture.effects)
             json["effects"].push_back({{"name", effect.name},
                                        {"draw_ms", effect.drawMs},
+                                       {"device_ms", effect.deviceMs},
+                                       {"passes", effect.passes},
+                                       {"textures", effect.textures},
+                                       {"device_bytes", effect.deviceBytes},
                                        {"bricks", effect.bricks},
                                        {"changed_pixels", effect.changesPixels},
                                        {"change_rms_255", effect.changeRms}});

@@ -37,8 +37,9 @@ struct RenderRequest {
 /// What a picture has by an effect, against the same without it.
 struct EffectCost {
     std::string name;
-    double drawMs = 0;
+    double drawMs = 0, deviceMs = 0;
     std::int64_t bricks = 0;  ///< drawn for it alone
+    std::int64_t passes = 0, textures = 0, deviceBytes = 0;
     std::int64_t changesPixels = 0;
     double changeRms = 0;  ///< of red, green and blue, of 255
 };

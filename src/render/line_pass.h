@@ -17,6 +17,9 @@ namespace tessera {
 /// Used on the thread of its context.
 class LinePass {
   public:
+    /// drawLines() and compose(), and what they take.
+    static constexpr int kPasses = 2, kTextures = 4;
+
     /// For pictures drawn in tiles of an edge, into a colour and a depth texture.
     LinePass(GlContext& context, int edge, const GlTexture& color, const GlTexture& depth);
 

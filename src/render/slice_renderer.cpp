@@ -564,6 +564,8 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     };
     thread_.run([&](GlContext& context) {
         device_->prepare(context, pool.brickCells(), options.effects, hasLines);
+        count.passes = 1 + (hasLines ? LinePass::kPasses : 0);
+        count.textures = 2 + (hasLines ? LinePass::kTextures : 0);
         if (hasLines) device_->lines->take(context, lines, scene.view(), scene.raySize());
         uploaded->bricks = GlBuffer(context, std::span(placed));
         uploaded->stops = GlBuffer(context, std::span(stops));
@@ -589,7 +591,13 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
                 uploaded->textures.push_back(std::move(texture));
             }
             made.passes = pass.passes();
+            count.passes += made.passes;
+            count.textures += made.textures;
             count.deviceBytes += made.bytes;
+            if (options.measuresDevice) {
+                gl.Finish();
+                count.deviceMs += timer.elapsedMs();
+            }
             count.drawMs += timer.elapsedMs();
         });
     }
@@ -604,6 +612,11 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
             thread_.run([&](GlContext& context) {
                 const GlFunctions& gl = context.functions();
                 const Timer timer;
+                std::optional<GlQuery> elapsed;
+                if (options.measuresDevice) {
+                    elapsed.emplace(context, GL_TIME_ELAPSED);
+                    elapsed->begin();
+                }
                 if (hasLines) {
                     device_->lines->drawLines(gl, tile, picture);
                     ++count.draws;
@@ -612,6 +625,11 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
                 bindBuffers(gl);
                 device_->bindTextures(gl, uploaded->textures);
                 device_->draw(context, pool, runs, placed.size(), tile, picture, group, hasLines, count);
+                if (elapsed) {
+                    elapsed->end();
+                    const auto elapsedNs = double(elapsed->result());
+                    count.deviceMs += elapsedNs > 0 ? 1e-6 * elapsedNs : timer.elapsedMs();
+                }
                 gl.GetTextureSubImage(device_->color.id(), 0, 0, 0, 0, tile.width, tile.height, 1, GL_RGBA,
                                       GL_FLOAT, GLsizei(rays.size() * sizeof(Rgba)), rays.data());
                 count.drawMs += timer.elapsedMs();

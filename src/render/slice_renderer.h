@@ -34,6 +34,7 @@ struct RenderOptions {
     ValueRange values;
     /// In the order in which they shade.
     std::vector<Effect> effects;
+    bool measuresDevice = false;  ///< RenderCounts::deviceMs; waits for each part of the picture
     /// For effects that need it a number of each brick, at least 0; NaN where it isn't known.
     std::vector<float> brickNumbers;
     /// What of the pool is data, for effects that show its extent.
@@ -58,9 +59,14 @@ struct RenderCounts {
     std::int64_t bricks = 0;        ///< drawn
     std::int64_t unseenBricks = 0;  ///< left out: beside the picture, or nothing of them is shown
     std::int64_t draws = 0;
+    std::int64_t passes = 0;               ///< over each part of the picture, and those of effects
+    std::int64_t textures = 0;             ///< beside the pool's
     std::int64_t deviceBytes = 0;          ///< beside the pool
     std::vector<EffectResources> effects;  ///< of those that make any
     double drawMs = 0;                     ///< until the picture is read back
+    /// RenderOptions::measuresDevice: what the device took to draw, by its own clock; where it has none, and
+    /// of passes of effects, until it had finished.
+    double deviceMs = 0;
 };
 
 /// Draws the bricks of a pool by slices across the view, composited from the front to the back.

@@ -1185,7 +1185,8 @@ class Pictures(AppTest):
         report = self.render("--scene", path, "--explain", size="60x48")
         self.assertEqual([effect["name"] for effect in report["effects"]], ["isosurfaces", "shading"])
         for effect in report["effects"]:
-            self.assertEqual(set(effect), {"name", "draw_ms", "bricks", "changed_pixels", "change_rms_255"})
+            self.assertEqual(set(effect), {"name", "draw_ms", "device_ms", "bricks", "passes", "textures", "device_bytes", "changed_pixels",
+                                           "change_rms_255"})
             self.assertGreater(effect["changed_pixels"], 50)
             self.assertGreater(effect["change_rms_255"], 0.5)
         every = self.pixels()
