@@ -75,6 +75,9 @@ struct Effect {
     /// vec4 f(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction): what a slab has that is
     /// thin, colour times opacity, and opacity; codes and places at both ends of the part in the mesh.
     std::string sheet;
+    /// bool f(float codeBegin, float codeEnd): whether that has anything; where it hasn't, `sheet` isn't
+    /// called.
+    std::string hasSheet;
     /// vec4 f(vec3 local): what is on a face of the brick, where the ray comes in or goes out.
     std::string face;
     /// vec4 f(float codeBegin, float codeEnd, float layers, out float share): colour and opacity of a slab so

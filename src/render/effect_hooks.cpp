@@ -25,6 +25,8 @@ constexpr Hook kHooks[] = {
     {"SHEET", &Effect::sheet,
      "vec4 sheetByEffects(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction)", kSum, kAdd,
      "(codeBegin, codeEnd, begin, end, direction);\n", kReturnSum},
+    {"SHEET", &Effect::hasSheet, "bool haveSheet(float codeBegin, float codeEnd)", "", "    if (",
+     "(codeBegin, codeEnd)) return true;\n", "    return false;\n"},
     {"FACE", &Effect::face, "vec4 faceByEffects(vec3 local)", kSum, kAdd, "(local);\n", kReturnSum},
     {"CLASSIFY", &Effect::classify,
      "vec4 classifyByEffects(float codeBegin, float codeEnd, float layers, out float share)", "",

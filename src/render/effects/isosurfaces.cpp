@@ -23,6 +23,7 @@ Effect isosurfacesEffect(std::vector<Isosurface> surfaces, const Vec3d& towardsL
     effect.name = "isosurfaces";
     effect.texts = {text::kPoolPlace, text::kNear, text::kGradient, text::kLight, text::kIsosurfaces};
     effect.sheet = "isosurfacesSheet";
+    effect.hasSheet = "isosurfacesCross";
     effect.needsAllBricks = true;
     effect.readsIndex = true;
     effect.setUniforms = [surfaces, towardsLight](const EffectScene& scene) {

@@ -4,6 +4,12 @@ uniform float isosurfaceCodes[16];
 uniform int isosurfaceCount;
 uniform vec3 isosurfaceLight;  // towards the light; 0: from the camera
 
+bool isosurfacesCross(float codeBegin, float codeEnd) {
+    for (int i = 0; i < isosurfaceCount; ++i)
+        if ((codeBegin < isosurfaceCodes[i]) != (codeEnd < isosurfaceCodes[i])) return true;
+    return false;
+}
+
 vec4 isosurfacesSheet(float codeBegin, float codeEnd, vec3 begin, vec3 end, vec3 direction) {
     vec4 sum = vec4(0);
     // In the order in which the ray meets them.

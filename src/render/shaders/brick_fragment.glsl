@@ -84,9 +84,15 @@ void main() {
     // The next one; the first may be where the brick begins.
     float surface = surfaceBehind(origin, direction, begin > 0.0 ? intBitsToFloat(floatBitsToInt(begin) - 1) : -1.0);
 #endif
-#if defined(SURFACE) || defined(LINES)
+#ifdef SHEET
+    // A slab that has a sheet ends a part: many rays that take slabs together seldom have one each.
+    bool hasSheet = false;
+    vec3 sheetBegin, sheetEnd;
+    float sheetCodeBegin, sheetCodeEnd;
+#endif
+#if defined(SURFACE) || defined(LINES) || defined(SHEET)
     // Part by part, each from one surface or line to the next.
-    for (int parts = kMostSurfaces; begin < end && parts > 0 && light >= kDark; --parts) {
+    for (int parts = kMostSurfaces + left; begin < end && parts > 0 && light >= kDark; --parts) {
     partEnd = end;
     left += 4;
 #ifdef LINES
@@ -158,11 +164,20 @@ void main() {
         }
 #endif
 #ifdef SHEET
-        if (hasEnds) add(sheetByEffects(codeThere, codeBeyond, there, beyond, direction), sum, light);
+        hasSheet = hasEnds && haveSheet(codeThere, codeBeyond);
+        if (hasSheet) {
+            sheetBegin = there, sheetEnd = beyond;
+            sheetCodeBegin = codeThere, sheetCodeEnd = codeBeyond;
+            break;
+        }
 #endif
         if (light < kDark) break;
     }
-#if defined(SURFACE) || defined(LINES)
+#ifdef SHEET
+    if (hasSheet) add(sheetByEffects(sheetCodeBegin, sheetCodeEnd, sheetBegin, sheetEnd, direction), sum, light);
+    hasSheet = false;
+#endif
+#if defined(SURFACE) || defined(LINES) || defined(SHEET)
     slab -= 1.0;  // a part ends within it
     }
 #endif
