@@ -12,6 +12,7 @@
 #include "base/timer.h"
 #include "job/describe_files.h"
 #include "job/import_mesh.h"
+#include "job/source_effects.h"
 #include "job/vdb_source.h"
 #include "refine/camera_view.h"
 #include "tessera/error.h"
@@ -149,6 +150,7 @@ bool ViewSession::takeOpened() {
     if (!isOpening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
     Opened opened = opening_.get();
     source_ = std::move(opened.source);
+    effectsOf_.reset();
     mesh_ = dynamic_cast<MeshSource*>(source_.get());
     file_ = std::move(opened.file);
     path_ = opened.path;
@@ -161,6 +163,26 @@ bool ViewSession::takeOpened() {
 Scene ViewSession::sceneNow() const {
     Scene scene = document_.scene();
     if (width_ > 0 && height_ > 0) scene.width = width_, scene.height = height_;
+    return scene;
+}
+
+/// What can't be made of the source is left out, and noted.
+Scene ViewSession::completeScene() {
+    Scene scene = sceneNow();
+    if (effectsOf_ != document_.revision()) {
+        effectsOf_ = document_.revision();
+        effects_.clear();
+        for (const Effect& effect : scene.effects) {
+            Scene one = scene;
+            one.effects = {effect};
+            try {
+                effects_.push_back(withEffectsOf(std::move(one), *source_, job_).effects.front());
+            } catch (const InputError& error) {
+                mail_->put(error.what());
+            }
+        }
+    }
+    scene.effects = effects_;
     return scene;
 }
 
@@ -232,7 +254,7 @@ double ViewSession::scaleFor(double ms, double slices) const {
 bool ViewSession::draw(double scale, double slices, int samples,
                        const std::function<bool()>& wasInterrupted) {
     const Timer timer;
-    ScenePicture asked = pictureOf(sceneNow(), *source_, true);
+    ScenePicture asked = pictureOf(completeScene(), *source_, true);
     const auto state = source_->pool().state();
     if (!state) return false;
     Shown shown{document_.revision(), state->number, width_, height_, samples, scale, slices};
@@ -395,7 +417,7 @@ void ViewSession::writePicture(const std::string& path) {
     if (!source_) throw InputError("there is nothing to show yet");
     const bool isExr = path.ends_with(".exr");
     if (!isExr && !path.ends_with(".png")) throw InputError(path + ": pictures are .png or .exr files");
-    const Scene scene = sceneNow();
+    const Scene scene = completeScene();
     if (isExr || shown_ != wanted()) {
         const ScenePicture asked = pictureOf(scene, *source_, !isExr);
         const auto state = source_->pool().state();

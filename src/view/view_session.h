@@ -137,13 +137,13 @@ class ViewSession {
     bool takeOpened();
     void follow();
     Scene sceneNow() const;
+    Scene completeScene();
     bool isMoving() const;
     bool sample(double ms);
     double scaleFor(double ms, double slices) const;
     bool draw(double scale, double slices, int samples, const std::function<bool()>& wasInterrupted);
     Did drawOrSample(const std::function<bool()>& wasInterrupted);
     Shown wanted() const;
-    void note(const std::string& message);
 
     Job job_;
     ViewOptions options_;
@@ -161,8 +161,10 @@ class ViewSession {
     std::string openingPath_;
     std::atomic<bool> isEnding_ = false;
 
-    std::size_t followed_ = 0;     // revision of the document that the bricks follow
-    std::optional<Scene> opened_;  // what the source was opened for
+    std::size_t followed_ = 0;              // revision of the document that the bricks follow
+    std::optional<Scene> opened_;           // what the source was opened for
+    std::vector<Effect> effects_;           // of the scene, with what they take of the source
+    std::optional<std::size_t> effectsOf_;  // revision of the document that they are of
     bool isRefined_ = false;
     int width_ = 0, height_ = 0;
     Clock::time_point touched_, lastDrawn_;

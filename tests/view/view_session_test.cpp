@@ -130,6 +130,24 @@ TEST_F(ViewSessionTest, ItsPictureIsThatOfRenderForTheSceneItSaves) {
     EXPECT_EQ(bytesOf(again), bytesOf(shown));
 }
 
+TEST_F(ViewSessionTest, EffectsTakeWhatTheyNeedOfTheMesh) {
+    open();
+    edit([](Json& json) { json["legend"] = false; });
+    settle();
+    const std::vector<std::uint8_t> plain = session_->picture().rgb;
+    edit([](Json& json) { json["effects"] = {{"outline", {{"edges", "all"}}}}; });
+    settle();
+    EXPECT_NE(session_->picture().rgb, plain);
+    EXPECT_TRUE(session_->takeMessages().empty());
+    // What the mesh doesn't have is said once, and the rest is drawn.
+    edit([](Json& json) { json["effects"] = {{"errors", Json::object()}}; });
+    settle();
+    EXPECT_EQ(session_->picture().rgb, plain);
+    const std::vector<std::string> messages = session_->takeMessages();
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_NE(messages[0].find("effects.errors"), std::string::npos);
+}
+
 TEST_F(ViewSessionTest, WhatMovesIsCoarseAndConvergesAtRest) {
     open();
     const RgbImage converged = session_->picture();
