@@ -229,13 +229,19 @@ struct EffectEntry {
 
 const std::vector<EffectEntry>& effectEntries() {
     static const std::vector<EffectEntry> entries{
+        {"preintegration", "pre-integrated slabs", {}},
         {"shading",
          "light by the slope",
          {{"ambient", 0, 1, 0.35},
           {"diffuse", 0, 1, 0.65},
           {"specular", 0, 1, 0.2},
           {"shininess", 1, 100, 30}}},
-        {"isosurfaces", "isosurface", {}},
+        {"isosurfaces", "isosurfaces", {}},
+        {"cuts", "cut planes with contours", {}},
+        {"probes", "probe: a ball cut out", {{"opacity", 0, 1, 1}}},
+        {"axes", "axes", {}},
+        {"scale_bar", "scale bar", {}},
+        {"outline", "edges of the mesh", {{"angle", 1, 179, 30}}},
         {"bricks", "edges of bricks", {{"width", 0.5, 5, 1.5}, {"opacity", 0, 1, 0.8}}},
     };
     return entries;
@@ -243,16 +249,105 @@ const std::vector<EffectEntry>& effectEntries() {
 
 /// What an effect begins with.
 Json firstOptions(const ViewSession& session, const std::string& name) {
-    if (name != "isosurfaces") return Json::object();
     const ValueRange& range = session.source()->range();
-    Json surface{{"value", 0.5 * (range.min + range.max)}};
-    return {{"surfaces", Json::array({surface})}};
+    const Box3d& bounds = session.source()->boundsWorld();
+    const Vec3d middle = 0.5 * (bounds.min + bounds.max), size = bounds.size();
+    if (name == "isosurfaces")
+        return {{"surfaces", Json::array({{{"value", 0.5 * (range.min + range.max)}}})}};
+    if (name == "cuts")
+        return {{"planes", Json::array({{{"normal", {0, 1, 0}}, {"offset", middle.y}}})},
+                {"contours", Json::object()}};
+    if (name == "probes") {
+        const Vec3d at = session.viewCamera().eyeWorld;
+        const double longest = std::max({size.x, size.y, size.z});
+        // On the side from which it is seen.
+        const Vec3d towards = glm::length(at - middle) > 0 ? glm::normalize(at - middle) : Vec3d(0, 0, 1);
+        const Vec3d center = glm::clamp(middle + 0.25 * longest * towards, bounds.min, bounds.max);
+        return {
+            {"shapes",
+             Json::array(
+                 {{{"sphere", {{"center", {center.x, center.y, center.z}}, {"radius", 0.25 * longest}}}}})}};
+    }
+    return Json::object();
+}
+
+/// How far a plane of a normal may be moved through the data.
+std::array<double, 2> offsetsThrough(const Box3d& bounds, const Json& normal) {
+    std::array<double, 2> range{};
+    for (int a = 0; a < 3; ++a) {
+        const auto n = normal[std::size_t(a)].get<double>();
+        range[0] += std::min(n * bounds.min[a], n * bounds.max[a]);
+        range[1] += std::max(n * bounds.min[a], n * bounds.max[a]);
+    }
+    return range;
+}
+
+/// Sliders of things in a list, which may be taken away and others added.
+bool drawEffectParts(ViewSession& session, PanelState& state, const std::string& name, const Json& options) {
+    const ValueRange& range = session.source()->range();
+    const Box3d& bounds = session.source()->boundsWorld();
+    bool isDragged = false;
+    if (name == "isosurfaces") {
+        for (std::size_t i = 0; i < options["surfaces"].size(); ++i) {
+            ImGui::PushID(int(i));
+            const auto in = [&](Json& json) -> Json& {
+                return json["effects"]["isosurfaces"]["surfaces"][i];
+            };
+            isDragged = slider(session, state, "value", options["surfaces"][i], in, "value", range.min,
+                               range.max, range.min) ||
+                        isDragged;
+            isDragged = slider(session, state, "opacity", options["surfaces"][i], in, "opacity", 0, 1, 1) ||
+                        isDragged;
+            ImGui::PopID();
+        }
+        if (options["surfaces"].size() < 16 && ImGui::SmallButton("one more"))
+            change(session, state, [&](Json& to) {
+                to["effects"]["isosurfaces"]["surfaces"].push_back(
+                    {{"value", 0.5 * (range.min + range.max)}});
+            });
+    }
+    if (name == "cuts") {
+        for (std::size_t i = 0; i < options["planes"].size(); ++i) {
+            ImGui::PushID(int(i));
+            const auto in = [&](Json& json) -> Json& { return json["effects"]["cuts"]["planes"][i]; };
+            const Json& plane = options["planes"][i];
+            const std::array<double, 2> through = offsetsThrough(bounds, plane["normal"]);
+            isDragged =
+                slider(session, state, "offset", plane, in, "offset", through[0], through[1], through[0]) ||
+                isDragged;
+            isDragged = slider(session, state, "opacity", plane, in, "opacity", 0, 1, 1) || isDragged;
+            ImGui::PopID();
+        }
+        bool hasContours = options.contains("contours");
+        if (ImGui::Checkbox("contour lines", &hasContours))
+            change(session, state, [&](Json& to) {
+                Json& cuts = to["effects"]["cuts"];
+                hasContours ? void(cuts["contours"] = Json::object()) : void(cuts.erase("contours"));
+            });
+    }
+    if (name == "probes")
+        for (std::size_t i = 0; i < options["shapes"].size(); ++i) {
+            if (!options["shapes"][i].contains("sphere")) continue;
+            ImGui::PushID(int(i));
+            const Vec3d size = bounds.size();
+            const double longest = std::max({size.x, size.y, size.z});
+            isDragged =
+                slider(
+                    session, state, "radius", options["shapes"][i]["sphere"],
+                    [&](Json& json) -> Json& { return json["effects"]["probes"]["shapes"][i]["sphere"]; },
+                    "radius", longest / 100, longest, longest / 4) ||
+                isDragged;
+            ImGui::PopID();
+        }
+    return isDragged;
 }
 
 bool drawEffects(ViewSession& session, PanelState& state) {
     const Json effects = found(session.document().json(), "effects");
     bool isDragged = false;
     for (const EffectEntry& entry : effectEntries()) {
+        // A file has no mesh of its own.
+        if (std::string(entry.name) == "outline" && !session.mesh()) continue;
         bool isOn = effects.contains(entry.name);
         ImGui::PushID(entry.name);
         if (ImGui::Checkbox(entry.title, &isOn)) toggleEffect(session, entry.name);
@@ -265,27 +360,7 @@ bool drawEffects(ViewSession& session, PanelState& state) {
                                 [&](Json& json) -> Json& { return json["effects"][entry.name]; }, number.key,
                                 number.low, number.high, number.otherwise) ||
                             isDragged;
-            if (std::string(entry.name) == "isosurfaces") {
-                const ValueRange& range = session.source()->range();
-                for (std::size_t i = 0; i < options["surfaces"].size(); ++i) {
-                    ImGui::PushID(int(i));
-                    const auto in = [&](Json& json) -> Json& {
-                        return json["effects"]["isosurfaces"]["surfaces"][i];
-                    };
-                    isDragged = slider(session, state, "value", options["surfaces"][i], in, "value",
-                                       range.min, range.max, range.min) ||
-                                isDragged;
-                    isDragged =
-                        slider(session, state, "opacity", options["surfaces"][i], in, "opacity", 0, 1, 1) ||
-                        isDragged;
-                    ImGui::PopID();
-                }
-                if (options["surfaces"].size() < 16 && ImGui::SmallButton("one more"))
-                    change(session, state, [&](Json& to) {
-                        to["effects"]["isosurfaces"]["surfaces"].push_back(
-                            {{"value", 0.5 * (range.min + range.max)}});
-                    });
-            }
+            isDragged = drawEffectParts(session, state, entry.name, options) || isDragged;
             ImGui::Unindent();
         }
         ImGui::PopID();
@@ -300,13 +375,7 @@ bool drawClips(ViewSession& session, PanelState& state) {
     bool isDragged = false;
     for (std::size_t i = 0; i < planes.size(); ++i) {
         ImGui::PushID(int(i));
-        Vec3d normal;
-        for (int a = 0; a < 3; ++a) normal[a] = planes[i]["normal"][std::size_t(a)].get<double>();
-        double low = 0, high = 0;
-        for (int a = 0; a < 3; ++a) {
-            low += std::min(normal[a] * bounds.min[a], normal[a] * bounds.max[a]);
-            high += std::max(normal[a] * bounds.min[a], normal[a] * bounds.max[a]);
-        }
+        const auto [low, high] = offsetsThrough(bounds, planes[i]["normal"]);
         isDragged =
             slider(
                 session, state, "offset", planes[i],

@@ -33,6 +33,7 @@ constexpr float kPanelWidth = 340, kStatusHeight = 26;
 constexpr double kIdleMs = 120;
 constexpr double kFlyASecond = 0.8;
 constexpr float kHandleReach = 9;
+constexpr double kDoubleClickMs = 500;
 /// A device that is lost more often than that isn't tried again.
 constexpr int kMostRecoveries = 3;
 constexpr std::chrono::seconds kRecoveriesWithin{10};
@@ -58,7 +59,10 @@ struct Window::Screen {
     std::vector<std::string> dropped;
     std::optional<std::array<double, 2>> lastMouse;
     bool isDragging = false;
-    int handle = -1;  ///< clip plane that is dragged
+    int handle = -1;              ///< that is dragged
+    Clock::time_point pressed{};  ///< the last press of the left button, and where
+    double pressedX = 0, pressedY = 0;
+    std::optional<std::array<double, 2>> doubleClick;  ///< screen coordinates
     std::vector<Clock::time_point> recoveries;
     bool hasFailed = false;
 
@@ -96,10 +100,19 @@ Window::Window(ViewSession& session, const WindowOptions& options)
     glfwMakeContextCurrent(window);
     glfwSwapInterval(0);
     glfwSetWindowSizeLimits(window, 480, 320, GLFW_DONT_CARE, GLFW_DONT_CARE);
-    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int, int action, int) {
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
         Screen& s = Screen::of(w);
         s.buttonsDown += action == GLFW_PRESS ? 1 : -1;
         ++s.inputs;
+        if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
+        // By events, as two clicks may come while one picture is drawn.
+        double x = 0, y = 0;
+        glfwGetCursorPos(w, &x, &y);
+        const bool isSecond =
+            msSince(s.pressed) < kDoubleClickMs && std::hypot(x - s.pressedX, y - s.pressedY) < kHandleReach;
+        if (isSecond) s.doubleClick = {x, y};
+        s.pressed = isSecond ? Clock::time_point{} : Clock::now();
+        s.pressedX = x, s.pressedY = y;
     });
     glfwSetCursorPosCallback(window, [](GLFWwindow* w, double, double) {
         if (Screen::of(w).buttonsDown > 0) ++Screen::of(w).inputs;
@@ -204,24 +217,86 @@ void handleKeys(ViewSession& session, Window*, PanelState& state, GLFWwindow* wi
     wasMoving = isMoving;
 }
 
-/// Where the handle of a clip plane is: the place of the plane that is nearest to the middle of the data.
-struct ClipHandle {
-    std::array<double, 2> at{},
-        ahead{};           // pixels of the picture; ahead: a tenth of the data along the normal
-    double stepWorld = 0;  // from `at` to `ahead`, in offsets
+/// A dot that is dragged: a plane along its normal, or a ball's middle across the view.
+struct Handle {
+    nlohmann::ordered_json::json_pointer at;  // of the plane or ball in the scene
+    bool isPlane = false;
+    Vec3d placeWorld{0};
+    Vec3d normal{0};  // of a plane
 };
 
-std::optional<ClipHandle> clipHandle(const ViewSession& session, const Json& plane) {
-    Vec3d normal;
-    for (int a = 0; a < 3; ++a) normal[a] = plane["normal"][std::size_t(a)].get<double>();
+Vec3d vectorOf(const Json& json) {
+    return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
+}
+
+std::vector<Handle> handlesOf(const ViewSession& session) {
+    using Pointer = nlohmann::ordered_json::json_pointer;
+    const Json& json = session.document().json();
     const Box3d& bounds = session.source()->boundsWorld();
     const Vec3d middle = 0.5 * (bounds.min + bounds.max);
-    const double square = glm::dot(normal, normal);
-    const Vec3d place = middle + (plane["offset"].get<double>() - glm::dot(normal, middle)) / square * normal;
-    const double step = 0.1 * glm::length(bounds.size()) / std::sqrt(square);
-    const auto at = session.pixelOf(place), ahead = session.pixelOf(place + step * normal);
-    if (!at || !ahead) return std::nullopt;
-    return ClipHandle{*at, *ahead, step * square};
+    std::vector<Handle> handles;
+    const auto addPlane = [&](const Pointer& at) {
+        const Vec3d normal = vectorOf(json[at]["normal"]);
+        const double offset = json[at]["offset"].get<double>();
+        // The place of the plane that is nearest to the middle of the data.
+        const Vec3d place = middle + (offset - glm::dot(normal, middle)) / glm::dot(normal, normal) * normal;
+        handles.push_back({at, true, place, normal});
+    };
+    for (const char* list : {"/clip/planes", "/effects/cuts/planes"}) {
+        const Pointer planes(list);
+        if (!json.contains(planes)) continue;
+        for (std::size_t i = 0; i < json[planes].size(); ++i) addPlane(planes / i);
+    }
+    const Pointer shapes("/effects/probes/shapes");
+    if (json.contains(shapes))
+        for (std::size_t i = 0; i < json[shapes].size(); ++i) {
+            if (json[shapes][i].contains("plane")) addPlane(shapes / i / "plane");
+            if (json[shapes][i].contains("sphere"))
+                handles.push_back(
+                    {shapes / i / "sphere", false, vectorOf(json[shapes][i]["sphere"]["center"])});
+        }
+    return handles;
+}
+
+/// Draws the handles, and moves the one that is dragged. @param held the number of that one, -1: none.
+/// @param onWindow pixels of the window for those of the picture. @param movedPixels the hand, of the
+/// picture.
+void drawHandles(ViewSession& session, ImDrawList& draw, int& held, bool isActive,
+                 const std::function<ImVec2(const std::array<double, 2>&)>& onWindow,
+                 const std::array<double, 2>& movedPixels) {
+    const std::vector<Handle> handles = handlesOf(session);
+    const ImVec2 mouse = ImGui::GetIO().MousePos;
+    const double reachWorld = 0.1 * glm::length(session.source()->boundsWorld().size());
+    for (std::size_t i = 0; i < handles.size(); ++i) {
+        const Handle& handle = handles[i];
+        const auto at = session.pixelOf(handle.placeWorld);
+        if (!at) continue;
+        const ImVec2 dot = onWindow(*at);
+        const bool isNear = std::hypot(dot.x - mouse.x, dot.y - mouse.y) < kHandleReach;
+        if (isNear && ImGui::IsItemClicked(ImGuiMouseButton_Left)) held = int(i);
+        const bool isHeld = held == int(i) && isActive;
+        const ImU32 colour = isNear || isHeld ? IM_COL32(255, 200, 60, 255) : IM_COL32(255, 140, 0, 220);
+        Json moved = session.document().json();
+        if (handle.isPlane) {
+            const double length = glm::length(handle.normal);
+            const auto ahead = session.pixelOf(handle.placeWorld + reachWorld / length * handle.normal);
+            if (!ahead) continue;
+            draw.AddLine(dot, onWindow(*ahead), colour, 2);
+            const double x = (*ahead)[0] - (*at)[0], y = (*ahead)[1] - (*at)[1];
+            const double along = (movedPixels[0] * x + movedPixels[1] * y) / std::max(x * x + y * y, 1.0);
+            Json& offset = moved[handle.at]["offset"];
+            offset = offset.get<double>() + along * reachWorld * length;
+        } else {
+            const Vec3d place =
+                session.movedTo(handle.placeWorld, (*at)[0] + movedPixels[0], (*at)[1] + movedPixels[1]);
+            moved[handle.at]["center"] = {place.x, place.y, place.z};
+        }
+        draw.AddCircleFilled(dot, 6, colour);
+        if (isHeld && (movedPixels[0] != 0 || movedPixels[1] != 0)) {
+            session.document().drag(std::move(moved));
+            session.touch();
+        }
+    }
 }
 
 }  // namespace
@@ -278,36 +353,11 @@ void Window::drawOnce(bool isPictureNew) {
     const double dense = double(session_.width()) / std::max(double(wide), 1.0);
     const std::array<double, 2> mouse{(io.MousePos.x - left) * dense, io.MousePos.y * dense};
     if (session_.source()) {
-        const Json& json = session_.document().json();
-        if (json.contains("clip") && json["clip"].contains("planes")) {
-            const Json planes = json["clip"]["planes"];
-            for (std::size_t i = 0; i < planes.size(); ++i) {
-                const auto handle = clipHandle(session_, planes[i]);
-                if (!handle) continue;
-                const auto on = [&](const std::array<double, 2>& p) {
-                    return ImVec2(left + float(p[0] / dense), float(p[1] / dense));
-                };
-                const ImVec2 a = on(handle->at), b = on(handle->ahead);
-                const bool isNear = std::hypot(a.x - io.MousePos.x, a.y - io.MousePos.y) < kHandleReach;
-                const ImU32 colour = isNear || screen.handle == int(i) ? IM_COL32(255, 200, 60, 255)
-                                                                       : IM_COL32(255, 140, 0, 220);
-                draw.AddLine(a, b, colour, 2);
-                draw.AddCircleFilled(a, 6, colour);
-                if (isNear && ImGui::IsItemClicked(ImGuiMouseButton_Left)) screen.handle = int(i);
-                if (screen.handle == int(i) && isActive) {
-                    const double x = handle->ahead[0] - handle->at[0], y = handle->ahead[1] - handle->at[1];
-                    const double along = (io.MouseDelta.x * dense * x + io.MouseDelta.y * dense * y) /
-                                         std::max(x * x + y * y, 1.0);
-                    if (along != 0) {
-                        Json moved = json;
-                        Json& offset = moved["clip"]["planes"][i]["offset"];
-                        offset = offset.get<double>() + along * handle->stepWorld;
-                        session_.document().drag(std::move(moved));
-                        session_.touch();
-                    }
-                }
-            }
-        }
+        drawHandles(session_, draw, screen.handle, isActive,
+                    [&](const std::array<double, 2>& p) {
+                        return ImVec2(left + float(p[0] / dense), float(p[1] / dense));
+                    },
+                    {io.MouseDelta.x * dense, io.MouseDelta.y * dense});
         if (isActive && screen.handle < 0 && (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)) {
             const double right = io.MouseDelta.x / std::max(double(high), 1.0),
                          down = io.MouseDelta.y / std::max(double(high), 1.0);
@@ -328,8 +378,9 @@ void Window::drawOnce(bool isPictureNew) {
                        [&](ViewCamera& camera) { camera.zoom(std::exp(0.15 * double(io.MouseWheel))); });
             session_.document().endDrag();
         }
-        if (isHovered && ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left))
-            if (const auto seen = session_.seenAt(mouse[0], mouse[1])) setFocus(session_, seen->placeWorld);
+        if (const auto click = std::exchange(screen.doubleClick, {}); click && isHovered)
+            if (const auto seen = session_.seenAt(((*click)[0] - left) * dense, (*click)[1] * dense))
+                setFocus(session_, seen->placeWorld);
         if (isHovered && !isActive) {
             if (screen.lastMouse != mouse) {
                 const auto seen = session_.seenAt(mouse[0], mouse[1]);
@@ -397,11 +448,6 @@ void Window::run(const std::function<bool()>& isEnding) {
             session_.resize(framebufferWidth - int(std::lround(screen.panelWidth() * dense)),
                             framebufferHeight - int(std::lround(kStatusHeight * screen.scale * dense)));
         }
-        if (session_.path() != title) {
-            title = session_.path();
-            glfwSetWindowTitle(screen.window,
-                               (std::filesystem::path(title).filename().string() + " - Tessera").c_str());
-        }
         ViewSession::Did did = ViewSession::Did::nothing;
         try {
             const std::size_t before = screen.inputs;
@@ -423,6 +469,16 @@ void Window::run(const std::function<bool()>& isEnding) {
         for (std::string& message : session_.takeMessages()) state.messages.push_back(std::move(message));
         for (const FrameTime& frame : session_.takeFrames())
             state.frameMs = frame.ms, state.frameScale = frame.scale;
+        // What goes on is told where the window is minimised, too.
+        std::string named = std::filesystem::path(session_.path()).filename().string();
+        named += named.empty() ? "Tessera" : " - Tessera";
+        if (session_.isOpening())
+            named = "reading - " + named;
+        else if (session_.source() && !session_.isRefined())
+            named = "refining - " + named;
+        else if (session_.source() && !session_.hasConverged())
+            named = "drawing - " + named;
+        if (named != title) glfwSetWindowTitle(screen.window, (title = named).c_str());
         isBusy = did != ViewSession::Did::nothing || session_.isOpening();
         const bool isPictureNew = session_.pictureNumber() != pictureNumber;
         const bool isDue = isPictureNew || screen.inputs != inputs || msSince(drawn) > kIdleMs || !isBusy;

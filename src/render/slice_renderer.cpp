@@ -209,6 +209,7 @@ class Scene {
                 finestSpacing_,
                 options_.layerWorld,
                 pixelSize(),
+                options_.lineScale,
                 eye_,
                 options_.function,
                 largestOf(options_.brickNumbers)};
@@ -538,8 +539,9 @@ RgbaImage SliceRenderer::draw(const BrickPool& pool, const PoolState& state, con
     for (const PlacedBrick& brick : bricks)
         lineView.coarsestSpacingWorld =
             std::max(lineView.coarsestSpacingWorld, frame.spacingWorld(brick.key.depth));
-    const ProjectedLines lines = projectLines(linesOf(options.effects, lineView).segments, options.within,
-                                              options.camera, scene.eye(), side);
+    std::vector<LineSegment> segments = linesOf(options.effects, lineView).segments;
+    for (LineSegment& segment : segments) segment.widthPixels *= options.lineScale;
+    const ProjectedLines lines = projectLines(segments, options.within, options.camera, scene.eye(), side);
     const bool hasLines = !lines.lines.empty();
     if (seen.empty() && !hasLines) {
         if (counts) *counts = count;

@@ -39,6 +39,8 @@ struct RenderOptions {
     std::vector<float> brickNumbers;
     /// What of the pool is data, for effects that show its extent.
     Box3d boundsWorld{};
+    /// Of the widths of lines, which count in pixels: for a picture that is drawn smaller than it is shown.
+    double lineScale = 1;
     /// Rays along an edge of what is drawn at once, 64 to 1024; a picture is cancelled between such parts.
     int raysATile = 1024;
     /// Called before each part; may be null.

@@ -261,6 +261,7 @@ bool ViewSession::draw(double scale, double slices, int samples,
     RenderOptions options = asked.options;
     options.slicesAVoxel = slices;
     options.samplesAPixel = samples;
+    options.lineScale = scale;
     options.camera.widthPixels = std::max(1, int(std::lround(scale * width_)));
     options.camera.heightPixels = std::max(1, int(std::lround(scale * height_)));
     std::atomic<bool> cancel = false;
@@ -411,6 +412,17 @@ std::optional<std::array<double, 2>> ViewSession::pixelOf(const Vec3d& placeWorl
     const double u = glm::dot(from, view.right) / (depth * view.wide);
     const double v = glm::dot(from, view.up) / (depth * view.high);
     return std::array{0.5 * (u + 1) * camera.widthPixels, 0.5 * (1 - v) * camera.heightPixels};
+}
+
+Vec3d ViewSession::movedTo(const Vec3d& placeWorld, double xPixels, double yPixels) const {
+    if (!pixelOf(placeWorld)) return placeWorld;
+    const Camera& camera = asked_->options.camera;
+    const CameraView view = viewOf(camera);
+    const double depth = glm::dot(placeWorld - camera.eyeWorld, view.forward);
+    const ViewRay ray = view.rayOf(camera, xPixels, yPixels);
+    const double along = glm::dot(ray.direction, view.forward);
+    return ray.originWorld +
+           (depth - glm::dot(ray.originWorld - camera.eyeWorld, view.forward)) / along * ray.direction;
 }
 
 void ViewSession::writePicture(const std::string& path) {

@@ -11,7 +11,7 @@ Effect brickEdgesEffect(const BrickEdges& edges) {
     effect.face = "bricksFace";
     effect.needsAllBricks = true;
     effect.setUniforms = [edges](const EffectScene& scene) {
-        scene.set("bricksWidth", 0.5 * edges.widthPixels * scene.pixelSize);
+        scene.set("bricksWidth", 0.5 * edges.widthPixels * scene.pixelSize * scene.lineScale);
         scene.set("bricksOpacity", edges.opacity);
     };
     return effect;

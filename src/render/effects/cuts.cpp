@@ -58,7 +58,7 @@ Effect cutsEffect(const Cuts& cuts) {
         scene.set("contourCount", int(codes.size()));
         const std::array<double, 3>& color = contours.color;
         scene.set("contourColor", Vec3d(color[0], color[1], color[2]));
-        scene.set("contourWidth", 0.5 * contours.widthPixels);
+        scene.set("contourWidth", 0.5 * contours.widthPixels * scene.lineScale);
         scene.set("cutPixelSize", scene.pixelSize);
     };
     return effect;
