@@ -131,6 +131,7 @@ void run(const Options& options) {
         alone += scheduler.counts().sampled - before;
     }
     const double idleRate = 1000 * double(alone) / timer.elapsedMs();
+    fmt::print("{} bricks; ", session.source()->bricks().size());
     fmt::print("refining over idle: median {:.2f}, 99 % {:.2f}; {:.0f} of {:.0f} bricks a second, {:.0f} %\n",
                refining.first / idle.first, refining.second / idle.second, withFrames, idleRate,
                100 * withFrames / idleRate);

@@ -9,7 +9,7 @@ packages=(
   libgl-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6
   libglfw3-dev libimgui-dev libstb-dev xvfb openbox xdotool
   libgtest-dev libbenchmark-dev clang-format tetgen
-  python3 python3-vtk9 python3-openvdb python3-numpy python3-jsonschema
+  python3 python3-vtk9 python3-openvdb python3-numpy python3-jsonschema python3-xlib python3-pil
 )
 
 missing=()

@@ -39,7 +39,7 @@ void give(ViewSession& session, const Points& points) {
     Json json = session.document().json();
     Json list = Json::array();
     for (const auto& [share, opacity] : points) list.push_back({share, opacity});
-    json["transfer_function"].erase("stops");
+    if (json.contains("transfer_function")) json["transfer_function"].erase("stops");
     json["transfer_function"]["opacity"] = std::move(list);
     session.document().drag(std::move(json));
     session.touch();
@@ -66,6 +66,7 @@ bool editFunction(ViewSession& session) {
     const ImVec2 size(ImGui::GetContentRegionAvail().x, kHeight);
     ImGui::InvisibleButton("opacities", size,
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
+    const bool isHovered = ImGui::IsItemHovered();
     ImDrawList& draw = *ImGui::GetWindowDrawList();
     draw.AddRectFilled(low, {low.x + size.x, low.y + size.y}, ImGui::GetColorU32(ImGuiCol_FrameBg), 3);
     // Logarithmic, as most of a mesh has few values.
@@ -116,7 +117,6 @@ bool editFunction(ViewSession& session) {
         }
         return -1;
     };
-    const bool isHovered = ImGui::IsItemHovered();
     if (isHovered && ImGui::IsMouseClicked(ImGuiMouseButton_Right) && points.size() > 1) {
         if (const int i = nearest(); i >= 0) {
             points.erase(points.begin() + i);

@@ -239,6 +239,8 @@ const std::vector<EffectEntry>& effectEntries() {
         {"isosurfaces", "isosurfaces", {}},
         {"cuts", "cut planes with contours", {}},
         {"probes", "probe: a ball cut out", {{"opacity", 0, 1, 1}}},
+        {"occlusion", "ambient occlusion", {}},
+        {"shadows", "shadows", {{"strength", 0, 1, 1}}},
         {"axes", "axes", {}},
         {"scale_bar", "scale bar", {}},
         {"outline", "edges of the mesh", {{"angle", 1, 179, 30}}},
@@ -268,6 +270,7 @@ Json firstOptions(const ViewSession& session, const std::string& name) {
              Json::array(
                  {{{"sphere", {{"center", {center.x, center.y, center.z}}, {"radius", 0.25 * longest}}}}})}};
     }
+    if (name == "shadows") return {{"light", {0.4, -0.6, 1}}};
     return Json::object();
 }
 
@@ -433,10 +436,19 @@ void drawFiles(ViewSession& session, PanelState& state) {
 
 }  // namespace
 
+namespace {
+
+/// Not twice one after the other.
+void tell(PanelState& state, const std::string& message) {
+    if (state.messages.empty() || state.messages.back() != message) state.messages.push_back(message);
+}
+
+}  // namespace
+
 void saveScene(ViewSession& session, PanelState& state) {
     try {
         session.saveScene(state.scenePath);
-        state.messages.push_back(state.scenePath + " is saved");
+        tell(state, state.scenePath + " is saved");
     } catch (const std::exception& error) {
         state.messages.emplace_back(error.what());
     }
@@ -445,7 +457,7 @@ void saveScene(ViewSession& session, PanelState& state) {
 void savePicture(ViewSession& session, PanelState& state) {
     try {
         session.writePicture(state.picturePath);
-        state.messages.push_back(state.picturePath + " is saved");
+        tell(state, state.picturePath + " is saved");
     } catch (const std::exception& error) {
         state.messages.emplace_back(error.what());
     }
@@ -561,7 +573,8 @@ void drawHelp(PanelState& state) {
                                      {"arrows", "turn"},
                                      {"X Y Z", "along an axis; with Shift from the other side"},
                                      {"F", "all in view"},
-                                     {"G", "edges of bricks"},
+                                     {"G, O", "edges of bricks, of the mesh"},
+                                     {"C, P", "a cut plane, a ball cut out"},
                                      {"V", "bricks as fine as the picture shows"},
                                      {"B", "bookmark this view"},
                                      {"Ctrl Z, Ctrl Y", "undo, redo"},

@@ -13,8 +13,8 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "gl/gl_functions.h"
@@ -40,6 +40,10 @@ constexpr std::chrono::seconds kRecoveriesWithin{10};
 
 std::string lastError;
 
+struct PressedKey {
+    int key = 0, mods = 0;
+};
+
 double msSince(Clock::time_point then) {
     return std::chrono::duration<double, std::milli>(Clock::now() - then).count();
 }
@@ -62,6 +66,8 @@ struct Window::Screen {
     int handle = -1;              ///< that is dragged
     Clock::time_point pressed{};  ///< the last press of the left button, and where
     double pressedX = 0, pressedY = 0;
+    std::vector<PressedKey> keys;                      ///< since the last frame
+    std::set<int> held;                                ///< now
     std::optional<std::array<double, 2>> doubleClick;  ///< screen coordinates
     std::vector<Clock::time_point> recoveries;
     bool hasFailed = false;
@@ -118,7 +124,15 @@ Window::Window(ViewSession& session, const WindowOptions& options)
         if (Screen::of(w).buttonsDown > 0) ++Screen::of(w).inputs;
     });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double, double) { ++Screen::of(w).inputs; });
-    glfwSetKeyCallback(window, [](GLFWwindow* w, int, int, int, int) { ++Screen::of(w).inputs; });
+    // By events too: a key may be pressed and let go while one picture is drawn.
+    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
+        Screen& s = Screen::of(w);
+        ++s.inputs;
+        if (action == GLFW_PRESS) s.keys.push_back({key, mods});
+        // One that began with Ctrl is no movement, whichever is let go first.
+        if (action == GLFW_PRESS && (mods & GLFW_MOD_CONTROL) == 0) s.held.insert(key);
+        if (action == GLFW_RELEASE) s.held.erase(key);
+    });
     glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int, int) { ++Screen::of(w).inputs; });
     glfwSetWindowCloseCallback(window, [](GLFWwindow* w) { ++Screen::of(w).inputs; });
     glfwSetDropCallback(window, [](GLFWwindow* w, int count, const char** paths) {
@@ -156,51 +170,83 @@ void moveCamera(ViewSession& session, const std::function<void(ViewCamera&)>& mo
     session.touch();
 }
 
-void lookAlong(ViewSession& session, const Vec3d& direction) {
+void pressKey(ViewSession& session, PanelState& state, GLFWwindow* window, const PressedKey& pressed) {
+    const bool hasShift = (pressed.mods & GLFW_MOD_SHIFT) != 0;
+    if ((pressed.mods & GLFW_MOD_CONTROL) != 0) {
+        switch (pressed.key) {
+            case GLFW_KEY_Z:
+                return hasShift ? session.document().redo() : session.document().undo();
+            case GLFW_KEY_Y:
+                return session.document().redo();
+            case GLFW_KEY_S:
+                return saveScene(session, state);
+            case GLFW_KEY_P:
+                return savePicture(session, state);
+            case GLFW_KEY_Q:
+                return glfwSetWindowShouldClose(window, GLFW_TRUE);
+            default:
+                return;
+        }
+    }
+    switch (pressed.key) {
+        case GLFW_KEY_H:
+        case GLFW_KEY_F1:
+            state.showsHelp = !state.showsHelp;
+            return;
+        case GLFW_KEY_T:
+            state.isLight = !state.isLight;
+            return;
+        case GLFW_KEY_TAB:
+            state.isOpen = !state.isOpen;
+            return;
+        default:
+            break;
+    }
+    if (!session.source()) return;
     Json json = session.document().json();
-    json["camera"] = {{"direction", {direction.x, direction.y, direction.z}}};
+    switch (pressed.key) {
+        case GLFW_KEY_G:
+            return toggleEffect(session, "bricks");
+        case GLFW_KEY_C:
+            return toggleEffect(session, "cuts");
+        case GLFW_KEY_P:
+            return toggleEffect(session, "probes");
+        case GLFW_KEY_O:
+            if (session.mesh()) toggleEffect(session, "outline");
+            return;
+        case GLFW_KEY_B:
+            return addBookmark(session, state);
+        case GLFW_KEY_F:
+            json.erase("camera");
+            break;
+        case GLFW_KEY_V:
+            if (!session.mesh()) return;
+            if (session.document().scene().bricks.pixelsAVoxel > 0)
+                json["bricks"].erase("view");
+            else
+                json["bricks"]["view"] = 4;
+            break;
+        case GLFW_KEY_X:
+        case GLFW_KEY_Y:
+        case GLFW_KEY_Z: {
+            Vec3d direction(0);
+            direction[pressed.key - GLFW_KEY_X] = hasShift ? -1 : 1;
+            json["camera"] = {{"direction", {direction.x, direction.y, direction.z}}};
+            break;
+        }
+        default:
+            return;
+    }
     session.document().change(std::move(json));
 }
 
-void handleKeys(ViewSession& session, Window*, PanelState& state, GLFWwindow* window) {
+void handleKeys(ViewSession& session, PanelState& state, GLFWwindow* window,
+                const std::vector<PressedKey>& keys, const std::set<int>& heldKeys) {
     const ImGuiIO& io = ImGui::GetIO();
     if (io.WantTextInput) return;
-    const auto pressed = [](int key) { return ImGui::IsKeyPressed(key, false); };
-    if (io.KeyCtrl) {
-        if (pressed(GLFW_KEY_Z)) io.KeyShift ? session.document().redo() : session.document().undo();
-        if (pressed(GLFW_KEY_Y)) session.document().redo();
-        if (pressed(GLFW_KEY_S)) saveScene(session, state);
-        if (pressed(GLFW_KEY_P)) savePicture(session, state);
-        if (pressed(GLFW_KEY_Q)) glfwSetWindowShouldClose(window, GLFW_TRUE);
-        return;
-    }
-    if (pressed(GLFW_KEY_H) || pressed(GLFW_KEY_F1)) state.showsHelp = !state.showsHelp;
-    if (pressed(GLFW_KEY_T)) state.isLight = !state.isLight;
-    if (pressed(GLFW_KEY_TAB)) state.isOpen = !state.isOpen;
+    for (const PressedKey& key : keys) pressKey(session, state, window, key);
     if (!session.source()) return;
-    if (pressed(GLFW_KEY_G)) toggleEffect(session, "bricks");
-    if (pressed(GLFW_KEY_B)) addBookmark(session, state);
-    if (pressed(GLFW_KEY_F)) {
-        Json json = session.document().json();
-        json.erase("camera");
-        session.document().change(std::move(json));
-    }
-    if (pressed(GLFW_KEY_V) && session.mesh()) {
-        Json json = session.document().json();
-        if (session.document().scene().bricks.pixelsAVoxel > 0)
-            json["bricks"].erase("view");
-        else
-            json["bricks"]["view"] = 4;
-        session.document().change(std::move(json));
-    }
-    const std::pair<int, int> axes[] = {{GLFW_KEY_X, 0}, {GLFW_KEY_Y, 1}, {GLFW_KEY_Z, 2}};
-    for (const auto& [key, axis] : axes)
-        if (pressed(key)) {
-            Vec3d direction(0);
-            direction[axis] = io.KeyShift ? -1 : 1;
-            lookAlong(session, direction);
-        }
-    const auto held = [](int key) { return ImGui::IsKeyDown(key) ? 1.0 : 0.0; };
+    const auto held = [&](int key) { return heldKeys.contains(key) ? 1.0 : 0.0; };
     const double step = kFlyASecond * std::min(double(io.DeltaTime), 0.2);
     const double ahead = held(GLFW_KEY_W) - held(GLFW_KEY_S), right = held(GLFW_KEY_D) - held(GLFW_KEY_A),
                  above = held(GLFW_KEY_E) - held(GLFW_KEY_Q);
@@ -406,7 +452,7 @@ void Window::drawOnce(bool isPictureNew) {
         if (ImGui::SmallButton("read")) state.messages.clear();
         ImGui::End();
     }
-    handleKeys(session_, this, state, screen.window);
+    handleKeys(session_, state, screen.window, std::exchange(screen.keys, {}), screen.held);
 
     ImGui::Render();
     const GlFunctions& gl = screen.gl;

@@ -632,10 +632,12 @@ void addCommand(CLI::App& app, CommandLine& line, const char* name, const char* 
 }
 
 /// What follows is read by the program that has the window.
-void addViewOptions(CLI::App& command, ViewArguments& a) {
+void addView(CLI::App& app, CommandLine& line) {
+    CLI::App& command = *app.add_subcommand("view", "show a mesh or a .vdb file in a window");
     command.set_help_flag();
     command.prefix_command();
-    command.add_option("words", a.words)->group("");
+    command.callback(
+        [&line, &command] { line.run = [words = command.remaining()] { return runView(words); }; });
 }
 
 void describe(CLI::App& app, CommandLine& line) {
@@ -661,7 +663,7 @@ void describe(CLI::App& app, CommandLine& line) {
                runPicture);
     addCommand(app, line, "render", "draw the volume of a .vdb file or a mesh: a .png or .exr",
                addRenderOptions, runRender);
-    addCommand(app, line, "view", "show a mesh or a .vdb file in a window", addViewOptions, runView);
+    addView(app, line);
     addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
                addCompareOptions, runCompare);
     addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",

@@ -97,12 +97,12 @@ int runRender(const RenderArguments& a) {
 }
 
 // A program of its own, so that this one needs no display's libraries.
-int runView(const ViewArguments& a) {
+int runView(const std::vector<std::string>& given) {
     std::error_code error;
     const std::filesystem::path self = std::filesystem::canonical(programPath(), error);
     const std::string program = (self.parent_path() / "tessera-view").string();
     std::vector<std::string> words{program, "--reader", self.string()};
-    words.insert(words.end(), a.words.begin(), a.words.end());
+    words.insert(words.end(), given.begin(), given.end());
     std::vector<char*> pointers;
     for (std::string& word : words) pointers.push_back(word.data());
     pointers.push_back(nullptr);

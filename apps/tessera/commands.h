@@ -43,10 +43,6 @@ struct RenderArguments {
     RenderRequest request;
     FramesRequest frames;
 };
-/// Words for the program that has the window.
-struct ViewArguments {
-    std::vector<std::string> words;
-};
 struct SliceArguments {
     CommonOptions common;
     RepairArguments repair;
@@ -83,7 +79,8 @@ int runPicture(const PictureArguments& arguments);
 int runRender(const RenderArguments& arguments);
 int runCompare(const CompareArguments& arguments);
 int runPaperTables(const PaperTablesArguments& arguments);
-int runView(const ViewArguments& arguments);
+/// @param words for the program that has the window.
+int runView(const std::vector<std::string>& words);
 int runSlice(const SliceArguments& arguments);
 int runFocusTrace(const FocusTraceArguments& arguments);
 

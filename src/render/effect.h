@@ -32,7 +32,7 @@ struct EffectScene {
     /// Of a pixel: its opening in radians, or with parallel rays its width in world units.
     double pixelSize = 0;
     double lineScale = 1;  ///< RenderOptions::lineScale
-    Vec3d eyeWorld{0};  ///< places in shaders are relative to it
+    Vec3d eyeWorld{0};     ///< places in shaders are relative to it
     const TransferFunction& function;
     double largestBrickNumber = 0;  ///< of those that are known
 

@@ -22,6 +22,8 @@ namespace tessera {
 
 namespace {
 
+/// Boxes are drawn larger by that share of a ray's width: some hundred times what a rasterizer rounds.
+constexpr double kBesidesRays = 0.3;
 /// Rays along an edge of what is drawn at once.
 constexpr int kTile = 1024, kLeastTile = 64;
 constexpr std::size_t kMostClips = 32;
@@ -152,7 +154,7 @@ class Scene {
         placed.spacing = float(spacing);
         double farthest = 1;  // parallel rays are as far apart everywhere
         if (!view_.isParallel) farthest = glm::length(glm::max(glm::abs(box.min), glm::abs(box.max)));
-        placed.besides = float(1.5 * raySize() * farthest + 1e-6 * glm::length(box.min));
+        placed.besides = float(kBesidesRays * raySize() * farthest + 1e-6 * glm::length(box.min));
         placed.texel = {texel.x, texel.y, texel.z};
         placed.isWhole = brick.isWhole;
         placed.index = {brick.key.index.x, brick.key.index.y, brick.key.index.z};

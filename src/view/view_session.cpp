@@ -25,13 +25,13 @@ namespace {
 constexpr std::chrono::milliseconds kTouchLasts{250};
 constexpr double kFrameMsOfGpu = 33, kFrameMsOfProcessor = 100;
 /// Of the time of a picture, what sampling has behind it.
-constexpr double kSamplingShare = 0.3;
+constexpr double kSamplingShare = 0.2;
 constexpr double kSampleMs = 20;
 /// Pictures of what is being refined, while nothing moves: such a multiple of a moving one's time, and a
 /// fifth of all time.
-constexpr double kRefiningFrames = 3, kRefiningPause = 4;
+constexpr double kFirstFrame = 0.3, kRefiningFrames = 3, kRefiningPause = 4;
 constexpr double kLeastScale = 0.1;
-constexpr double kMovingSlices = 0.5;
+constexpr double kMovingSlices = 0.25;
 /// Small parts, so that a hand needn't wait for them.
 constexpr int kRaysATile = 256;
 
@@ -62,6 +62,34 @@ RgbaImage resized(const RgbaImage& image, int width, int height, const Execution
         }
     });
     return to;
+}
+
+/// A small picture of one brick as a scene has them, so that the device's programs are there when a file is.
+void warmUp(SliceRenderer& renderer, GlThread& thread, const Scene& scene) {
+    const int cells = scene.bricks.cells, edge = cells + 1;
+    const ValueRange range{0, 1};
+    TexelCoding coding({ValueCoding(range, SampleFormat::r32f)}, SampleFormat::r32f);
+    PoolOptions poolOptions;
+    poolOptions.budgetBytes = 8 * std::int64_t(edge) * edge * edge * coding.pointBytes();
+    BrickPool pool(thread, cells, std::move(coding), poolOptions);
+    auto block = std::make_shared<Block>();
+    block->box = {Vec3i(0), Vec3i(edge)};
+    block->channels = 1;
+    block->values.resize(block->count());
+    for (std::size_t p = 0; p < block->count(); ++p) block->values[p] = float(p % 2);
+    block->coverage.assign(block->count(), 1);
+    block->coverage[0] = 0;  // not whole
+    const std::vector<ShownBrick> bricks{{GrowingLeaf{}, block}};
+    PoolTarget target(pool, 1);
+    target.publish({.removed = {}, .added = bricks});
+    RenderOptions options;
+    options.boundsWorld = {Vec3d(0), Vec3d(cells)};
+    options.camera = cameraOf(scene, options.boundsWorld, 0);
+    options.camera.widthPixels = options.camera.heightPixels = 32;
+    options.function.stops = {{0, {1, 1, 1}, 0.5}};
+    options.effects = scene.effects;
+    options.values = range;
+    renderer.draw(pool, *pool.state(), {Vec3d(0), 1, cells}, placeBricks(target, 0), options, {});
 }
 
 }  // namespace
@@ -102,6 +130,7 @@ ViewSession::ViewSession(const Job& job, const ViewOptions& options)
 ViewSession::~ViewSession() {
     isEnding_ = true;
     if (opening_.valid()) opening_.wait();
+    if (warming_.valid()) warming_.wait();
     // Before the thread that they live on.
     opening_ = {};
     source_.reset();
@@ -125,6 +154,14 @@ void ViewSession::open(const std::string& path) {
 void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile> file) {
     openingPath_ = path;
     const Scene scene = sceneNow();
+    if (!source_)
+        warming_ = std::async(std::launch::async, [this, scene = Scene(scene)]() mutable {
+            scene.camera = {};
+            try {
+                warmUp(*renderer_, *thread_, scene);
+            } catch (const std::exception&) {  // what is wrong is told where the picture is drawn
+            }
+        });
     opened_ = scene;
     opening_ = std::async(std::launch::async, [this, path, file = std::move(file), scene]() mutable {
         Opened opened{path, std::move(file), nullptr};
@@ -148,6 +185,7 @@ void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile>
 /// True where something was opened.
 bool ViewSession::takeOpened() {
     if (!isOpening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+    if (warming_.valid()) warming_.get();
     Opened opened = opening_.get();
     source_ = std::move(opened.source);
     effectsOf_.reset();
@@ -301,7 +339,9 @@ ViewSession::Did ViewSession::drawOrSample(const std::function<bool()>& wasInter
     if (isMoving()) {
         const bool wasSampled = sample(kSamplingShare * lastDrawMs_);
         if (!differs()) return wasSampled ? Did::sampled : Did::nothing;
-        draw(scaleFor(frameMs_, kMovingSlices), kMovingSlices, 1, nullptr);
+        // Sampling has its part of the time from one picture to the next.
+        const double ms = isRefined_ || !sharesProcessor_ ? frameMs_ : frameMs_ / (1 + kSamplingShare);
+        draw(scaleFor(ms, kMovingSlices), kMovingSlices, 1, nullptr);
         return Did::drew;
     }
     if (!isRefined_) {
@@ -309,7 +349,8 @@ ViewSession::Did ViewSession::drawOrSample(const std::function<bool()>& wasInter
         const double sinceMs = std::chrono::duration<double, std::milli>(Clock::now() - lastDrawn_).count();
         const bool isDue = shown_.revision != wish.revision || sinceMs > kRefiningPause * lastDrawMs_;
         if (differs() && isDue) {
-            const double ms = kRefiningFrames * frameMs_;
+            // The first picture of all is there as soon as can be.
+            const double ms = (shown_.state == 0 ? kFirstFrame : kRefiningFrames) * frameMs_;
             draw(scaleFor(ms, wish.slices), wish.slices, 1, wasInterrupted);
             return Did::drew;
         }
@@ -452,6 +493,7 @@ void ViewSession::saveScene(const std::string& path) {
 
 void ViewSession::recover() {
     if (opening_.valid()) opening_.wait();
+    if (warming_.valid()) warming_.get();
     renderer_.reset();
     std::unique_ptr<GlThread> lost = std::move(thread_);
     thread_ = options_.makeThread(chooseGlPlatform(options_.platform));

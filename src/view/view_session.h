@@ -105,7 +105,8 @@ class ViewSession {
     std::optional<Seen> seenAt(double xPixels, double yPixels) const;
     /// Where a place is in the picture, pixels; none behind the eye.
     std::optional<std::array<double, 2>> pixelOf(const Vec3d& placeWorld) const;
-    /// The place as far in front of the eye that is at another pixel; the place itself when it isn't in front.
+    /// The place as far in front of the eye that is at another pixel; the place itself when it isn't in
+    /// front.
     Vec3d movedTo(const Vec3d& placeWorld, double xPixels, double yPixels) const;
 
     /// Draws the picture to the end, and writes it as `tessera render` does: .png or .exr. Throws InputError,
@@ -161,6 +162,7 @@ class ViewSession {
     MeshSource* mesh_ = nullptr;
     std::future<Opened> opening_;
     std::string openingPath_;
+    std::future<void> warming_;
     std::atomic<bool> isEnding_ = false;
 
     std::size_t followed_ = 0;              // revision of the document that the bricks follow

@@ -1335,6 +1335,8 @@ class Pictures(AppTest):
             (True, {"bricks": {"resolution": 64, "cells": 8, "budget": 5e8, "focus": [{"place": [0, 0, 0], "radius": 1}], "view": 3}}),
             (False, {"bricks": {"focus": [{"radius": 1}]}}),
             (False, {"bricks": {"cells": 12}}),
+            (True, {"bookmarks": [{"name": "above", "camera": {"eye": [0, 0, 9], "target": [0, 0, 0], "up": [0, 1, 0]}}]}),
+            (False, {"bookmarks": [{"name": "above", "camera": {"eye": [0, 0]}}]}),
             (True, {"effects": {"shading": {"light": [1, 1, 1], "shininess": 10}, "bricks": {"width": 2}}}),
             (True, {"effects": {"isosurfaces": {"surfaces": [{"value": 0.5, "color": [1, 0, 0], "opacity": 0.5}]}}}),
             (False, {"effects": {"glow": {}}}),
