@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "scene/colour_maps.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -51,16 +52,13 @@ bool editFunction(ViewSession& session) {
     const PictureSource& source = *session.source();
     const Scene& scene = session.document().scene();
     const std::array<double, 2> range = shownRangeOf(scene.function, source.range());
-    // The histogram costs a walk over the mesh.
-    static std::size_t histogramOf = 0;
-    static const PictureSource* histogramFrom = nullptr;
-    static std::vector<double> histogram;
-    static TransferFunction function;
-    if (histogramOf != session.document().revision() || histogramFrom != &source) {
-        histogram = source.histogram(range);
+    const std::vector<double>& histogram = source.histogram(range);
+    TransferFunction function;
+    try {
         function = functionOf(scene.function, source.range(), histogram);
-        histogramOf = session.document().revision();
-        histogramFrom = &source;
+    } catch (const InputError& error) {  // such as a logarithmic scale from 0 on
+        ImGui::TextWrapped("%s", error.what());
+        return false;
     }
     const ImVec2 low = ImGui::GetCursorScreenPos();
     const ImVec2 size(ImGui::GetContentRegionAvail().x, kHeight);

@@ -18,6 +18,8 @@ namespace {
 
 using Json = SceneDocument::Json;
 
+constexpr std::size_t kMostMessages = 8;
+
 /// What the scene has at a key, or a value in place of it.
 double numberAt(const Json& json, const char* key, double otherwise) {
     return json.contains(key) && json[key].is_number() ? json[key].get<double>() : otherwise;
@@ -32,7 +34,7 @@ void change(ViewSession& session, PanelState& state, const std::function<void(Js
         isDragged ? session.document().drag(std::move(json)) : session.document().change(std::move(json));
         session.touch();
     } catch (const std::exception& error) {
-        state.messages.emplace_back(error.what());
+        tell(state, error.what());
     }
 }
 
@@ -117,7 +119,7 @@ bool drawFunction(ViewSession& session, PanelState& state) {
         if (ImGui::IsItemDeactivated()) session.document().endDrag();
         isDragged = isDragged || ImGui::IsItemActive();
         bool isLogarithmic = scene.function.isLogarithmic;
-        ImGui::BeginDisabled(!(range[0] > 0));
+        ImGui::BeginDisabled(!(range[0] > 0) && !isLogarithmic);
         if (ImGui::Checkbox("logarithmic", &isLogarithmic))
             change(session, state, [&](Json& to) { at(to, "transfer_function")["log"] = isLogarithmic; });
         ImGui::EndDisabled();
@@ -436,21 +438,18 @@ void drawFiles(ViewSession& session, PanelState& state) {
 
 }  // namespace
 
-namespace {
-
-/// Not twice one after the other.
 void tell(PanelState& state, const std::string& message) {
-    if (state.messages.empty() || state.messages.back() != message) state.messages.push_back(message);
+    if (!state.messages.empty() && state.messages.back() == message) return;
+    state.messages.push_back(message);
+    if (state.messages.size() > kMostMessages) state.messages.pop_front();
 }
-
-}  // namespace
 
 void saveScene(ViewSession& session, PanelState& state) {
     try {
         session.saveScene(state.scenePath);
         tell(state, state.scenePath + " is saved");
     } catch (const std::exception& error) {
-        state.messages.emplace_back(error.what());
+        tell(state, error.what());
     }
 }
 
@@ -459,7 +458,7 @@ void savePicture(ViewSession& session, PanelState& state) {
         session.writePicture(state.picturePath);
         tell(state, state.picturePath + " is saved");
     } catch (const std::exception& error) {
-        state.messages.emplace_back(error.what());
+        tell(state, error.what());
     }
 }
 

@@ -24,6 +24,9 @@ void drawStatus(const ViewSession& session, const PanelState& state, float left,
                 float height);
 void drawHelp(PanelState& state);
 
+/// Shows a message until it is read; not twice one after the other.
+void tell(PanelState& state, const std::string& message);
+
 // What keys do too; what goes wrong is a message.
 void saveScene(ViewSession& session, PanelState& state);
 void savePicture(ViewSession& session, PanelState& state);

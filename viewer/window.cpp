@@ -32,6 +32,8 @@ constexpr float kPanelWidth = 340, kStatusHeight = 26;
 /// The interface is drawn so often at least while bricks are sampled.
 constexpr double kIdleMs = 120;
 constexpr double kFlyASecond = 0.8;
+/// From the eye to what it looks at, in sizes of the data.
+constexpr double kNearest = 1e-5, kFarthest = 1e3;
 constexpr float kHandleReach = 9;
 constexpr double kDoubleClickMs = 500;
 /// A device that is lost more often than that isn't tried again.
@@ -160,10 +162,14 @@ Window::~Window() = default;
 
 namespace {
 
-/// Changes the camera as a drag.
+/// Changes the camera as a drag. Nearer or further than pictures can be drawn from it doesn't go.
 void moveCamera(ViewSession& session, const std::function<void(ViewCamera&)>& move) {
     ViewCamera camera = session.viewCamera();
     move(camera);
+    const double away = glm::length(camera.targetWorld - camera.eyeWorld);
+    const double size = glm::length(session.source()->boundsWorld().size());
+    if (!(away > kNearest * size && away < kFarthest * size && camera.heightWorld < kFarthest * size)) return;
+    if (camera.heightWorld > 0 && camera.heightWorld < kNearest * size) return;
     Json json = session.document().json();
     json["camera"] = camera.json();
     session.document().drag(std::move(json));
@@ -244,7 +250,11 @@ void handleKeys(ViewSession& session, PanelState& state, GLFWwindow* window,
                 const std::vector<PressedKey>& keys, const std::set<int>& heldKeys) {
     const ImGuiIO& io = ImGui::GetIO();
     if (io.WantTextInput) return;
-    for (const PressedKey& key : keys) pressKey(session, state, window, key);
+    for (const PressedKey& key : keys) try {
+            pressKey(session, state, window, key);
+        } catch (const std::exception& error) {
+            tell(state, error.what());
+        }
     if (!session.source()) return;
     const auto held = [&](int key) { return heldKeys.contains(key) ? 1.0 : 0.0; };
     const double step = kFlyASecond * std::min(double(io.DeltaTime), 0.2);
@@ -481,7 +491,7 @@ void Window::run(const std::function<bool()>& isEnding) {
                 else
                     session_.open(path);
             } catch (const std::exception& error) {
-                state.messages.emplace_back(error.what());
+                tell(state, error.what());
             }
         int framebufferWidth = 0, framebufferHeight = 0;
         glfwGetFramebufferSize(screen.window, &framebufferWidth, &framebufferHeight);
@@ -503,16 +513,16 @@ void Window::run(const std::function<bool()>& isEnding) {
                     return screen.inputs != before || isEnding();
                 });
         } catch (const GlError& error) {
-            state.messages.emplace_back(error.what());
+            tell(state, error.what());
             std::erase_if(screen.recoveries,
                           [](Clock::time_point at) { return Clock::now() - at > kRecoveriesWithin; });
             screen.recoveries.push_back(Clock::now());
             screen.hasFailed = int(screen.recoveries.size()) > kMostRecoveries;
             if (!screen.hasFailed) session_.recover();
         } catch (const std::exception& error) {
-            state.messages.emplace_back(error.what());
+            tell(state, error.what());
         }
-        for (std::string& message : session_.takeMessages()) state.messages.push_back(std::move(message));
+        for (const std::string& message : session_.takeMessages()) tell(state, message);
         for (const FrameTime& frame : session_.takeFrames())
             state.frameMs = frame.ms, state.frameScale = frame.scale;
         // What goes on is told where the window is minimised, too.
@@ -531,7 +541,12 @@ void Window::run(const std::function<bool()>& isEnding) {
         if (isShown && isDue) {
             pictureNumber = session_.pictureNumber();
             inputs = screen.inputs;
-            drawOnce(isPictureNew);
+            try {
+                drawOnce(isPictureNew);
+            } catch (const std::exception& error) {  // the scene has something that can't be
+                ImGui::EndFrame();
+                tell(state, error.what());
+            }
             drawn = Clock::now();
         } else if (did == ViewSession::Did::nothing && isBusy) {
             glfwWaitEventsTimeout(0.02);  // a file is being read

@@ -230,7 +230,8 @@ void ViewSession::resize(int widthPixels, int heightPixels) {
 }
 
 Camera ViewSession::camera() const {
-    return pictureOf(sceneNow(), *source_, true).options.camera;
+    const Scene scene = sceneNow();
+    return cameraOf(scene, source_->boundsWorld(), legendPixelsOf(scene, *source_, true));
 }
 
 ViewCamera ViewSession::viewCamera() const {
