@@ -144,9 +144,7 @@ bool drawBricks(ViewSession& session, PanelState& state) {
     const Scene& scene = session.document().scene();
     bool isDragged = false;
     bool followsView = scene.bricks.pixelsAVoxel > 0;
-    if (ImGui::Checkbox("as fine as the picture shows", &followsView))
-        change(session, state,
-               [&](Json& to) { followsView ? void(in(to)["view"] = 4) : void(in(to).erase("view")); });
+    if (ImGui::Checkbox("as fine as the picture shows", &followsView)) toggleViewFocus(session);
     if (followsView) isDragged = slider(session, state, "pixels a voxel", bricks, in, "view", 1, 32, 4, true);
     int points = int(std::lround(std::log2(scene.bricks.resolution)));
     const std::string shown = fmt::format("{} points", scene.bricks.resolution);
@@ -484,6 +482,24 @@ void setFocus(ViewSession& session, const Vec3d& placeWorld) {
     session.document().change(std::move(json));
 }
 
+void toggleViewFocus(ViewSession& session) {
+    Json json = session.document().json();
+    Json& bricks = at(json, "bricks");
+    if (bricks.contains("view"))
+        bricks.erase("view");
+    else
+        bricks["view"] = 4;
+    session.document().change(std::move(json));
+    session.touch();
+}
+
+void showAll(ViewSession& session) {
+    Json json = session.document().json();
+    json.erase("camera");
+    session.document().change(std::move(json));
+    session.touch();
+}
+
 void toggleEffect(ViewSession& session, const std::string& name) {
     Json json = session.document().json();
     Json& effects = at(json, "effects");
@@ -513,7 +529,7 @@ bool drawPanel(ViewSession& session, PanelState& state, float widthPixels, float
     if (ImGui::Button("redo")) document.redo();
     ImGui::EndDisabled();
     ImGui::SameLine();
-    if (ImGui::Button("all in view")) change(session, state, [](Json& to) { to.erase("camera"); });
+    if (ImGui::Button("all in view")) showAll(session);
     ImGui::SameLine();
     if (ImGui::Button("help")) state.showsHelp = !state.showsHelp;
     const auto part = [&](const char* title, bool isOpenAtFirst, const auto& draw) {

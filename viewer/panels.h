@@ -32,6 +32,10 @@ void saveScene(ViewSession& session, PanelState& state);
 void savePicture(ViewSession& session, PanelState& state);
 void addBookmark(ViewSession& session, PanelState& state);
 void setFocus(ViewSession& session, const Vec3d& placeWorld);
+/// Bricks as fine as the picture shows, or not. What is shown is a mesh.
+void toggleViewFocus(ViewSession& session);
+/// The camera is found so that all is in the picture.
+void showAll(ViewSession& session);
 /// Turns an effect on or off.
 void toggleEffect(ViewSession& session, const std::string& name);
 

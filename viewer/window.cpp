@@ -223,15 +223,10 @@ void pressKey(ViewSession& session, PanelState& state, GLFWwindow* window, const
         case GLFW_KEY_B:
             return addBookmark(session, state);
         case GLFW_KEY_F:
-            json.erase("camera");
-            break;
+            return showAll(session);
         case GLFW_KEY_V:
-            if (!session.mesh()) return;
-            if (session.document().scene().bricks.pixelsAVoxel > 0)
-                json["bricks"].erase("view");
-            else
-                json["bricks"]["view"] = 4;
-            break;
+            if (session.mesh()) toggleViewFocus(session);
+            return;
         case GLFW_KEY_X:
         case GLFW_KEY_Y:
         case GLFW_KEY_Z: {

@@ -91,4 +91,13 @@ void MeshSource::fill(ValueHistogram& histogram) const {
     }
 }
 
+std::unique_ptr<MeshSource> makeMeshSource(const std::string& path, const TetMesh& mesh, const Scene& scene,
+                                           int threads, GlThread& thread, const Execution& execution) {
+    try {
+        return std::make_unique<MeshSource>(mesh, scene, threads, thread, execution);
+    } catch (const InputError& error) {
+        throw InputError(path + ": " + error.what());
+    }
+}
+
 }  // namespace tessera

@@ -52,4 +52,8 @@ class MeshSource : public PictureSource {
     std::unique_ptr<LiveBricks> live_;
 };
 
+/// The same of a mesh that was read from a file: what is wrong is told with its name.
+std::unique_ptr<MeshSource> makeMeshSource(const std::string& path, const TetMesh& mesh, const Scene& scene,
+                                           int threads, GlThread& thread, const Execution& execution);
+
 }  // namespace tessera

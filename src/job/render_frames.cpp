@@ -51,10 +51,6 @@ SceneCamera fixedCamera(const Camera& camera) {
     return fixed;
 }
 
-bool isEmpty(const RgbaImage& image) {
-    return std::none_of(image.pixels.begin(), image.pixels.end(), [](const Rgba& p) { return p[3] > 0; });
-}
-
 /// The pictures' names, when they can be written.
 std::vector<std::string> checkedOutputs(const FramesRequest& request, const Job& job) {
     if (request.picture.output == "-") throw InputError("several pictures can't go to standard output");
@@ -105,9 +101,8 @@ RenderedFrames drawFrames(const FramesRequest& request, const Scene& asked,
         else if (!asked.camera.eyeWorld)
             scene.camera = fixedCamera(cameraOf(asked, firstBounds, besides));
         const ScenePicture picture = pictureOf(scene, *source, !isExr);
-        const auto state = source->pool().state();
-        const RgbaImage image = renderer.draw(source->pool(), *state, source->frame(), source->bricks(),
-                                              picture.options, job.execution, &frames.last.counts);
+        const RgbaImage image =
+            drawFrom(*source, renderer, picture.options, job.execution, &frames.last.counts);
         shown += !isEmpty(image);
         if (isExr)
             writeLight(frames.outputs[n], image, job.execution);

@@ -112,12 +112,7 @@ std::unique_ptr<PictureSource> openPictureSource(const std::string& input, const
                                                  GlThread& thread, Job& job) {
     if (isVdbName(input)) return openVdbSource(input, scene.field, scene.component, thread, job);
     const MeshFile file = openMesh(input, {}, job);
-    std::unique_ptr<MeshSource> source;
-    try {
-        source = std::make_unique<MeshSource>(file.mesh, scene, 0, thread, job.execution);
-    } catch (const InputError& error) {
-        throw InputError(input + ": " + error.what());
-    }
+    std::unique_ptr<MeshSource> source = makeMeshSource(input, file.mesh, scene, 0, thread, job.execution);
     source->setFocus(scene);
     source->live().scheduler().finish(job.execution);
     source->live().update(BrickScheduler::Clock::now(), job.execution);
@@ -149,15 +144,13 @@ RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job&
     if (asked.lacksLegend)
         job.warn(
             fmt::format("a picture of {} x {} pixels has no room for a legend", scene.width, scene.height));
-    const auto state = source->pool().state();
     SliceRenderer renderer(thread);
     const auto draw = [&](const RenderOptions& of, RenderCounts& counts) {
-        return renderer.draw(source->pool(), *state, source->frame(), source->bricks(), of, job.execution,
-                             &counts);
+        return drawFrom(*source, renderer, of, job.execution, &counts);
     };
     RenderedPicture picture;
     const RgbaImage image = draw(asked.options, picture.counts);
-    if (std::none_of(image.pixels.begin(), image.pixels.end(), [](const Rgba& p) { return p[3] > 0; }))
+    if (isEmpty(image))
         throw InputError(
             fmt::format("nothing of {} is in the picture: the camera, a clip or the transfer "
                         "function leaves nothing to see",

@@ -72,6 +72,16 @@ ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isO
     return picture;
 }
 
+RgbaImage drawFrom(const PictureSource& source, SliceRenderer& renderer, const RenderOptions& options,
+                   const Execution& execution, RenderCounts* counts) {
+    const auto state = source.pool().state();
+    return renderer.draw(source.pool(), *state, source.frame(), source.bricks(), options, execution, counts);
+}
+
+bool isEmpty(const RgbaImage& drawn) {
+    return std::none_of(drawn.pixels.begin(), drawn.pixels.end(), [](const Rgba& p) { return p[3] > 0; });
+}
+
 RgbImage onScreen(const ScenePicture& picture, const RgbaImage& drawn) {
     RgbImage shown = overGround(drawn, picture.ground);
     putMarks(shown, picture.marks, picture.ground);

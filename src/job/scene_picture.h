@@ -27,6 +27,12 @@ int legendPixelsOf(const Scene& scene, const PictureSource& source, bool isOnScr
 /// Throws InputError for a scene that doesn't fit the source.
 ScenePicture pictureOf(const Scene& scene, const PictureSource& source, bool isOnScreen);
 
+/// Draws what is in the source's pool now. Throws as SliceRenderer::draw().
+RgbaImage drawFrom(const PictureSource& source, SliceRenderer& renderer, const RenderOptions& options,
+                   const Execution& execution, RenderCounts* counts = nullptr);
+/// Nothing is to be seen.
+bool isEmpty(const RgbaImage& drawn);
+
 /// What was drawn by a picture's options, before its ground and with its legend.
 RgbImage onScreen(const ScenePicture& picture, const RgbaImage& drawn);
 

@@ -35,12 +35,6 @@ constexpr double kMovingSlices = 0.25;
 /// Small parts, so that a hand needn't wait for them.
 constexpr int kRaysATile = 256;
 
-bool isSoftware(const GlDeviceInfo& info) {
-    for (const char* name : {"llvmpipe", "softpipe", "SWR"})
-        if (info.renderer.find(name) != std::string::npos) return true;
-    return false;
-}
-
 /// A picture at another size, linear between pixels.
 RgbaImage resized(const RgbaImage& image, int width, int height, const Execution& execution) {
     if (image.width == width && image.height == height) return image;
@@ -121,7 +115,7 @@ ViewSession::ViewSession(const Job& job, const ViewOptions& options)
         options_.makeThread = [](GlPlatform platform) { return std::make_unique<GlThread>(platform); };
     thread_ = options_.makeThread(chooseGlPlatform(options_.platform));
     renderer_ = std::make_unique<SliceRenderer>(*thread_);
-    sharesProcessor_ = isSoftware(thread_->info());
+    sharesProcessor_ = thread_->info().isSoftware;
     frameMs_ =
         options_.frameMs > 0 ? options_.frameMs : (sharesProcessor_ ? kFrameMsOfProcessor : kFrameMsOfGpu);
     touched_ = lastDrawn_ = Clock::now() - std::chrono::hours(1);
@@ -172,12 +166,7 @@ void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile>
         }
         if (!opened.file) opened.file = std::make_shared<const MeshFile>(openMesh(path, {}, job));
         const int threads = sharesProcessor_ ? 0 : std::max(1, job.execution.threadCount() - 1);
-        try {
-            opened.source =
-                std::make_unique<MeshSource>(opened.file->mesh, scene, threads, *thread_, job.execution);
-        } catch (const InputError& error) {
-            throw InputError(path + ": " + error.what());
-        }
+        opened.source = makeMeshSource(path, opened.file->mesh, scene, threads, *thread_, job.execution);
         return opened;
     });
 }
@@ -312,8 +301,7 @@ bool ViewSession::draw(double scale, double slices, int samples,
     }
     RenderCounts counts;
     try {
-        drawn_ = renderer_->draw(source_->pool(), *state, source_->frame(), source_->bricks(), options,
-                                 execution, &counts);
+        drawn_ = drawFrom(*source_, *renderer_, options, execution, &counts);
     } catch (const Cancelled&) {
         if (!cancel) throw;
         return false;
@@ -474,10 +462,8 @@ void ViewSession::writePicture(const std::string& path) {
     const Scene scene = completeScene();
     if (isExr || shown_ != wanted()) {
         const ScenePicture asked = pictureOf(scene, *source_, !isExr);
-        const auto state = source_->pool().state();
-        if (!state) throw InputError("there is nothing to show yet");
-        const RgbaImage image = renderer_->draw(source_->pool(), *state, source_->frame(), source_->bricks(),
-                                                asked.options, job_.execution);
+        if (!source_->pool().state()) throw InputError("there is nothing to show yet");
+        const RgbaImage image = drawFrom(*source_, *renderer_, asked.options, job_.execution);
         isExr ? writeLight(path, image, job_.execution) : writePng(path, onScreen(asked, image));
         return;
     }
