@@ -11,6 +11,7 @@
 
 #include "function_editor.h"
 #include "scene/colour_maps.h"
+#include "view/fresh_name.h"
 
 namespace tessera {
 
@@ -444,7 +445,9 @@ void tell(PanelState& state, const std::string& message) {
 
 void saveScene(ViewSession& session, PanelState& state) {
     try {
+        if (!state.savedScenes.contains(state.scenePath)) state.scenePath = freshName(state.scenePath);
         session.saveScene(state.scenePath);
+        state.savedScenes.insert(state.scenePath);
         tell(state, state.scenePath + " is saved");
     } catch (const std::exception& error) {
         tell(state, error.what());
@@ -453,8 +456,9 @@ void saveScene(ViewSession& session, PanelState& state) {
 
 void savePicture(ViewSession& session, PanelState& state) {
     try {
-        session.writePicture(state.picturePath);
-        tell(state, state.picturePath + " is saved");
+        const std::string path = freshName(state.picturePath);
+        session.writePicture(path);
+        tell(state, path + " is saved");
     } catch (const std::exception& error) {
         tell(state, error.what());
     }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <set>
 #include <string>
 
 #include "view/view_session.h"
@@ -11,6 +12,7 @@ namespace tessera {
 struct PanelState {
     bool isOpen = true, showsHelp = false, isLight = false;
     std::string scenePath, picturePath;
+    std::set<std::string> savedScenes;  ///< by this window, which may save them again
     std::string newBookmark;
     std::deque<std::string> messages;  ///< shown until they are read
     double frameMs = 0, frameScale = 1;
@@ -27,7 +29,8 @@ void drawHelp(PanelState& state);
 /// Shows a message until it is read; not twice one after the other.
 void tell(PanelState& state, const std::string& message);
 
-// What keys do too; what goes wrong is a message.
+// What keys do too; what goes wrong is a message. Files that aren't the window's own stay: another name is
+// found.
 void saveScene(ViewSession& session, PanelState& state);
 void savePicture(ViewSession& session, PanelState& state);
 void addBookmark(ViewSession& session, PanelState& state);

@@ -4,6 +4,7 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <fmt/format.h>
 #include <imgui.h>
+#include <imgui_internal.h>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -46,8 +47,19 @@ struct PressedKey {
     int key = 0, mods = 0;
 };
 
+/// Of a letter that key which has it on the keyboard's layout: GLFW tells where on an American one it is.
+int keyOnLayout(int key, int scancode) {
+    if (key < GLFW_KEY_A || key > GLFW_KEY_Z) return key;
+    const char* name = glfwGetKeyName(key, scancode);
+    const bool isLetter = name && name[0] >= 'a' && name[0] <= 'z' && name[1] == 0;
+    return isLetter ? GLFW_KEY_A + (name[0] - 'a') : key;
+}
+
+double msBetween(Clock::time_point from, Clock::time_point to) {
+    return std::chrono::duration<double, std::milli>(to - from).count();
+}
 double msSince(Clock::time_point then) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - then).count();
+    return msBetween(then, Clock::now());
 }
 
 }  // namespace
@@ -66,7 +78,8 @@ struct Window::Screen {
     std::optional<std::array<double, 2>> lastMouse;
     bool isDragging = false;
     int handle = -1;              ///< that is dragged
-    Clock::time_point pressed{};  ///< the last press of the left button, and where
+    Clock::time_point asked{};    ///< when all events until then had come
+    Clock::time_point pressed{};  ///< the last press of the left button came then at the latest, and where
     double pressedX = 0, pressedY = 0;
     std::vector<PressedKey> keys;                      ///< since the last frame
     std::set<int> held;                                ///< now
@@ -77,6 +90,11 @@ struct Window::Screen {
     static Screen& of(GLFWwindow* window) { return *static_cast<Screen*>(glfwGetWindowUserPointer(window)); }
     float panelWidth() const { return state.isOpen ? kPanelWidth * scale : 0; }
     float scale = 1;
+    /// Takes what has come, or waits for something to come.
+    void takeEvents(double seconds = 0) {
+        seconds > 0 ? glfwWaitEventsTimeout(seconds) : glfwPollEvents();
+        asked = Clock::now();
+    }
 
     ~Screen() {
         if (window) {
@@ -98,6 +116,7 @@ Window::Window(ViewSession& session, const WindowOptions& options)
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+    glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // so that a loss can be told
     GLFWwindow* window = glfwCreateWindow(options.width, options.height, "Tessera", nullptr, nullptr);
     if (!window) {
         glfwTerminate();
@@ -113,11 +132,12 @@ Window::Window(ViewSession& session, const WindowOptions& options)
         s.buttonsDown += action == GLFW_PRESS ? 1 : -1;
         ++s.inputs;
         if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
-        // By events, as two clicks may come while one picture is drawn.
+        // By events, as two clicks may come while one picture is drawn. When is known no better than that it
+        // was after the events before: what a picture takes isn't the hand's.
         double x = 0, y = 0;
         glfwGetCursorPos(w, &x, &y);
-        const bool isSecond =
-            msSince(s.pressed) < kDoubleClickMs && std::hypot(x - s.pressedX, y - s.pressedY) < kHandleReach;
+        const bool isSecond = msBetween(s.pressed, s.asked) < kDoubleClickMs &&
+                              std::hypot(x - s.pressedX, y - s.pressedY) < kHandleReach * s.scale;
         if (isSecond) s.doubleClick = {x, y};
         s.pressed = isSecond ? Clock::time_point{} : Clock::now();
         s.pressedX = x, s.pressedY = y;
@@ -127,8 +147,9 @@ Window::Window(ViewSession& session, const WindowOptions& options)
     });
     glfwSetScrollCallback(window, [](GLFWwindow* w, double, double) { ++Screen::of(w).inputs; });
     // By events too: a key may be pressed and let go while one picture is drawn.
-    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int mods) {
+    glfwSetKeyCallback(window, [](GLFWwindow* w, int place, int scancode, int action, int mods) {
         Screen& s = Screen::of(w);
+        const int key = keyOnLayout(place, scancode);
         ++s.inputs;
         if (action == GLFW_PRESS) s.keys.push_back({key, mods});
         // One that began with Ctrl is no movement, whichever is let go first.
@@ -205,6 +226,10 @@ void pressKey(ViewSession& session, PanelState& state, GLFWwindow* window, const
         case GLFW_KEY_TAB:
             state.isOpen = !state.isOpen;
             return;
+        case GLFW_KEY_ESCAPE:
+            state.showsHelp = false;
+            state.messages.clear();
+            return;
         default:
             break;
     }
@@ -244,24 +269,34 @@ void pressKey(ViewSession& session, PanelState& state, GLFWwindow* window, const
 void handleKeys(ViewSession& session, PanelState& state, GLFWwindow* window,
                 const std::vector<PressedKey>& keys, const std::set<int>& heldKeys) {
     const ImGuiIO& io = ImGui::GetIO();
-    if (io.WantTextInput) return;
+    // Where text is written letters are its own, and Ctrl Z is.
+    const auto isOfText = [&](const PressedKey& pressed) {
+        const bool hasControl = (pressed.mods & GLFW_MOD_CONTROL) != 0;
+        const bool isWindows =
+            pressed.key == GLFW_KEY_S || pressed.key == GLFW_KEY_P || pressed.key == GLFW_KEY_Q;
+        return io.WantTextInput && !(hasControl && isWindows);
+    };
     for (const PressedKey& key : keys) try {
-            pressKey(session, state, window, key);
+            if (!isOfText(key)) pressKey(session, state, window, key);
         } catch (const std::exception& error) {
             tell(state, error.what());
         }
-    if (!session.source()) return;
+    if (!session.source() || io.WantTextInput) return;
     const auto held = [&](int key) { return heldKeys.contains(key) ? 1.0 : 0.0; };
     const double step = kFlyASecond * std::min(double(io.DeltaTime), 0.2);
     const double ahead = held(GLFW_KEY_W) - held(GLFW_KEY_S), right = held(GLFW_KEY_D) - held(GLFW_KEY_A),
                  above = held(GLFW_KEY_E) - held(GLFW_KEY_Q);
     const double turn = held(GLFW_KEY_RIGHT) - held(GLFW_KEY_LEFT),
                  tilt = held(GLFW_KEY_UP) - held(GLFW_KEY_DOWN);
-    if (ahead != 0 || right != 0 || above != 0)
-        moveCamera(session,
-                   [&](ViewCamera& camera) { camera.fly(step * ahead, step * right, step * above); });
-    if (turn != 0 || tilt != 0)
-        moveCamera(session, [&](ViewCamera& camera) { camera.orbit(step * turn, step * tilt); });
+    try {
+        if (ahead != 0 || right != 0 || above != 0)
+            moveCamera(session,
+                       [&](ViewCamera& camera) { camera.fly(step * ahead, step * right, step * above); });
+        if (turn != 0 || tilt != 0)
+            moveCamera(session, [&](ViewCamera& camera) { camera.orbit(step * turn, step * tilt); });
+    } catch (const InputError& error) {  // the scene's camera can't be
+        tell(state, error.what());
+    }
     static bool wasMoving = false;
     const bool isMoving = ahead != 0 || right != 0 || above != 0 || turn != 0 || tilt != 0;
     if (wasMoving && !isMoving) session.document().endDrag();
@@ -307,6 +342,18 @@ std::vector<Handle> handlesOf(const ViewSession& session) {
                     {shapes / i / "sphere", false, vectorOf(json[shapes][i]["sphere"]["center"])});
         }
     return handles;
+}
+
+/// What went wrong, until it is read.
+void drawMessages(PanelState& state, float left) {
+    if (state.messages.empty()) return;
+    ImGui::SetNextWindowPos({left + 12, 12});
+    ImGui::Begin("messages", nullptr,
+                 ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove |
+                     ImGuiWindowFlags_NoFocusOnAppearing);
+    for (const std::string& message : state.messages) ImGui::TextUnformatted(message.c_str());
+    if (ImGui::SmallButton("read")) state.messages.clear();
+    ImGui::End();
 }
 
 /// Draws the handles, and moves the one that is dragged. @param held the number of that one, -1: none.
@@ -370,20 +417,17 @@ void Window::showPicture() {
                          picture.rgb.data());
 }
 
-void Window::drawOnce(bool isPictureNew) {
+void Window::drawInterface() {
     Screen& screen = *screen_;
     PanelState& state = screen.state;
-    if (isPictureNew) showPicture();
-    ImGui_ImplOpenGL3_NewFrame();
-    ImGui_ImplGlfw_NewFrame();
-    state.isLight ? ImGui::StyleColorsLight() : ImGui::StyleColorsDark();
-    ImGui::NewFrame();
     const ImGuiIO& io = ImGui::GetIO();
-    const float left = screen.panelWidth(), wide = io.DisplaySize.x - left;
-    const float bar = kStatusHeight * screen.scale, high = io.DisplaySize.y - bar;
+    const float left = screen.panelWidth(), wide = std::max(io.DisplaySize.x - left, 1.0f);
+    const float bar = kStatusHeight * screen.scale, high = std::max(io.DisplaySize.y - bar, 1.0f);
+    // What doesn't look at the scene first: it is there when that has something that can't be.
+    drawMessages(state, left);
+    drawHelp(state);
     if (state.isOpen) drawPanel(session_, state, left, io.DisplaySize.y);
     drawStatus(session_, state, left, high, wide, bar);
-    drawHelp(state);
 
     // The picture, and what a hand does there.
     ImGui::SetNextWindowPos({left, 0});
@@ -396,12 +440,12 @@ void Window::drawOnce(bool isPictureNew) {
     if (screen.texture && session_.source())
         draw.AddImage(ImTextureID(std::intptr_t(screen.texture)), {left, 0}, {left + wide, high});
     ImGui::SetCursorPos({0, 0});
-    ImGui::InvisibleButton("hand", {std::max(wide, 1.0f), std::max(high, 1.0f)},
+    ImGui::InvisibleButton("hand", {wide, high},
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight |
                                ImGuiButtonFlags_MouseButtonMiddle);
     const bool isHovered = ImGui::IsItemHovered(), isActive = ImGui::IsItemActive();
     // Pixels of the picture for one of the window.
-    const double dense = double(session_.width()) / std::max(double(wide), 1.0);
+    const double dense = double(session_.width()) / double(wide);
     const std::array<double, 2> mouse{(io.MousePos.x - left) * dense, io.MousePos.y * dense};
     if (session_.source()) {
         drawHandles(session_, draw, screen.handle, isActive,
@@ -410,8 +454,8 @@ void Window::drawOnce(bool isPictureNew) {
                     },
                     {io.MouseDelta.x * dense, io.MouseDelta.y * dense});
         if (isActive && screen.handle < 0 && (io.MouseDelta.x != 0 || io.MouseDelta.y != 0)) {
-            const double right = io.MouseDelta.x / std::max(double(high), 1.0),
-                         down = io.MouseDelta.y / std::max(double(high), 1.0);
+            const double right = double(io.MouseDelta.x) / double(high),
+                         down = double(io.MouseDelta.y) / double(high);
             const bool isMiddle = ImGui::IsMouseDown(ImGuiMouseButton_Middle);
             if (isMiddle || (ImGui::IsMouseDown(ImGuiMouseButton_Left) && io.KeyShift))
                 moveCamera(session_, [&](ViewCamera& camera) { camera.pan(right, -down); });
@@ -448,17 +492,24 @@ void Window::drawOnce(bool isPictureNew) {
     }
     ImGui::End();
     ImGui::PopStyleVar();
-    if (!state.messages.empty()) {
-        ImGui::SetNextWindowPos({left + 12, 12});
-        ImGui::Begin("messages", nullptr,
-                     ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
-                         ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoFocusOnAppearing);
-        for (const std::string& message : state.messages) ImGui::TextUnformatted(message.c_str());
-        if (ImGui::SmallButton("read")) state.messages.clear();
-        ImGui::End();
-    }
-    handleKeys(session_, state, screen.window, std::exchange(screen.keys, {}), screen.held);
+}
 
+void Window::drawOnce(bool isPictureNew) {
+    Screen& screen = *screen_;
+    PanelState& state = screen.state;
+    if (isPictureNew) showPicture();
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    state.isLight ? ImGui::StyleColorsLight() : ImGui::StyleColorsDark();
+    ImGui::NewFrame();
+    try {
+        drawInterface();
+    } catch (const std::exception& error) {  // the scene has something that can't be
+        ImGui::ErrorCheckEndFrameRecover(nullptr);
+        tell(state, error.what());
+    }
+    // After the mouse, which has moved what a key saves.
+    handleKeys(session_, state, screen.window, std::exchange(screen.keys, {}), screen.held);
     ImGui::Render();
     const GlFunctions& gl = screen.gl;
     int framebufferWidth = 0, framebufferHeight = 0;
@@ -469,6 +520,59 @@ void Window::drawOnce(bool isPictureNew) {
     gl.Clear(GL_COLOR_BUFFER_BIT);
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
     glfwSwapBuffers(screen.window);
+    if (gl.GetGraphicsResetStatus() != GL_NO_ERROR) giveUp();
+}
+
+void Window::giveUp() {
+    const std::string lost = "the OpenGL device of the window was lost";
+    saveScene(session_, screen_->state);
+    throw GlError(lost + "; " + screen_->state.messages.back());
+}
+
+/// Meshes and .vdb files first, so that a scene that comes with one is its own.
+void Window::openDropped() {
+    std::vector<std::string> paths = std::exchange(screen_->dropped, {});
+    const auto isScene = [](const std::string& path) { return path.ends_with(".json"); };
+    std::ranges::stable_partition(paths, [&](const std::string& path) { return !isScene(path); });
+    for (const std::string& path : paths) try {
+            isScene(path) ? session_.useScene(SceneDocument::read(path).json()) : session_.open(path);
+        } catch (const std::exception& error) {
+            tell(screen_->state, error.what());
+        }
+}
+
+/// A piece of the session's work; false: there was none.
+bool Window::drawPicture(const std::function<bool()>& isEnding) {
+    Screen& screen = *screen_;
+    PanelState& state = screen.state;
+    if (screen.hasFailed) return false;
+    const std::size_t before = screen.inputs;
+    try {
+        return session_.work([&] {
+            screen.takeEvents();
+            return screen.inputs != before || isEnding();
+        }) != ViewSession::Did::nothing;
+    } catch (const GlMemoryError& error) {  // another context would have no more of it
+        tell(state, error.what());
+        return false;
+    } catch (const GlError& error) {
+        tell(state, error.what());
+    } catch (const std::exception& error) {
+        tell(state, error.what());
+        return false;
+    }
+    std::erase_if(screen.recoveries,
+                  [](Clock::time_point at) { return Clock::now() - at > kRecoveriesWithin; });
+    screen.recoveries.push_back(Clock::now());
+    screen.hasFailed = int(screen.recoveries.size()) > kMostRecoveries;
+    try {
+        if (!screen.hasFailed) session_.recover();
+    } catch (const std::exception& error) {
+        tell(state, error.what());
+        screen.hasFailed = true;
+    }
+    if (screen.hasFailed) tell(state, "no more pictures are drawn; the scene can still be saved");
+    return false;
 }
 
 void Window::run(const std::function<bool()>& isEnding) {
@@ -479,15 +583,8 @@ void Window::run(const std::function<bool()>& isEnding) {
     bool isBusy = true;
     std::string title;
     while (!glfwWindowShouldClose(screen.window) && !isEnding()) {
-        isBusy ? glfwPollEvents() : glfwWaitEventsTimeout(0.25);
-        for (const std::string& path : std::exchange(screen.dropped, {})) try {
-                if (path.ends_with(".json"))
-                    session_.document().change(SceneDocument::read(path).json());
-                else
-                    session_.open(path);
-            } catch (const std::exception& error) {
-                tell(state, error.what());
-            }
+        screen.takeEvents(isBusy ? 0 : 0.25);
+        openDropped();
         int framebufferWidth = 0, framebufferHeight = 0;
         glfwGetFramebufferSize(screen.window, &framebufferWidth, &framebufferHeight);
         const bool isShown = framebufferWidth > 0 && framebufferHeight > 0 &&
@@ -499,24 +596,7 @@ void Window::run(const std::function<bool()>& isEnding) {
             session_.resize(framebufferWidth - int(std::lround(screen.panelWidth() * dense)),
                             framebufferHeight - int(std::lround(kStatusHeight * screen.scale * dense)));
         }
-        ViewSession::Did did = ViewSession::Did::nothing;
-        try {
-            const std::size_t before = screen.inputs;
-            if (!screen.hasFailed)
-                did = session_.work([&] {
-                    glfwPollEvents();
-                    return screen.inputs != before || isEnding();
-                });
-        } catch (const GlError& error) {
-            tell(state, error.what());
-            std::erase_if(screen.recoveries,
-                          [](Clock::time_point at) { return Clock::now() - at > kRecoveriesWithin; });
-            screen.recoveries.push_back(Clock::now());
-            screen.hasFailed = int(screen.recoveries.size()) > kMostRecoveries;
-            if (!screen.hasFailed) session_.recover();
-        } catch (const std::exception& error) {
-            tell(state, error.what());
-        }
+        const bool hasWorked = drawPicture(isEnding);
         for (const std::string& message : session_.takeMessages()) tell(state, message);
         for (const FrameTime& frame : session_.takeFrames())
             state.frameMs = frame.ms, state.frameScale = frame.scale;
@@ -530,21 +610,16 @@ void Window::run(const std::function<bool()>& isEnding) {
         else if (session_.source() && !session_.hasConverged())
             named = "drawing - " + named;
         if (named != title) glfwSetWindowTitle(screen.window, (title = named).c_str());
-        isBusy = did != ViewSession::Did::nothing || session_.isOpening();
+        isBusy = hasWorked || session_.isOpening();
         const bool isPictureNew = session_.pictureNumber() != pictureNumber;
         const bool isDue = isPictureNew || screen.inputs != inputs || msSince(drawn) > kIdleMs || !isBusy;
         if (isShown && isDue) {
             pictureNumber = session_.pictureNumber();
             inputs = screen.inputs;
-            try {
-                drawOnce(isPictureNew);
-            } catch (const std::exception& error) {  // the scene has something that can't be
-                ImGui::EndFrame();
-                tell(state, error.what());
-            }
+            drawOnce(isPictureNew);
             drawn = Clock::now();
-        } else if (did == ViewSession::Did::nothing && isBusy) {
-            glfwWaitEventsTimeout(0.02);  // a file is being read
+        } else if (!hasWorked && isBusy) {
+            screen.takeEvents(0.02);  // a file is being read
         }
     }
 }

@@ -18,19 +18,24 @@ struct WindowOptions {
 /// The window around a session: draws what it shows, and turns keys and the mouse into changes of the scene.
 class Window {
   public:
-    /// Throws EnvironmentError without a display, or without OpenGL 4.5 on it.
+    /// Throws IoError without a display, or without OpenGL 4.5 on it.
     Window(ViewSession& session, const WindowOptions& options);
     ~Window();
     Window(const Window&) = delete;
     Window& operator=(const Window&) = delete;
 
-    /// Until the user closes it, or `isEnding` says so.
+    /// Until the user closes it, or `isEnding` says so. Throws GlError when the window's own OpenGL device is
+    /// lost; the scene is saved first.
     void run(const std::function<bool()>& isEnding);
 
   private:
     struct Screen;
     void showPicture();
     void drawOnce(bool isPictureNew);
+    void drawInterface();
+    void openDropped();
+    bool drawPicture(const std::function<bool()>& isEnding);
+    [[noreturn]] void giveUp();
 
     ViewSession& session_;
     std::unique_ptr<Screen> screen_;

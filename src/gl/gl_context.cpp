@@ -147,14 +147,17 @@ void GlContext::listenToDebugOutput() {
 void GlContext::throwIfFailed() {
     TESSERA_CHECK(objects_->deleteStrays() == 0, "an OpenGL object was destroyed on another thread");
     std::string text;
+    bool lacksMemory = false;
     // A lost context may report the same error for ever.
     for (int i = 0; i < 16; ++i) {
         const GLenum error = functions().GetError();
         if (error == GL_NO_ERROR) break;
+        lacksMemory = lacksMemory || error == GL_OUT_OF_MEMORY;
         text += (text.empty() ? "" : ", ") + errorName(error);
     }
     for (const std::string& message : messages_) text += (text.empty() ? "" : ": ") + message;
     messages_.clear();
+    if (lacksMemory) throw GlMemoryError("OpenGL failed: " + text);
     if (!text.empty()) throw GlError("OpenGL failed: " + text);
 }
 

@@ -9,10 +9,17 @@
 
 #include "gl/gl_device.h"
 #include "gl/gl_functions.h"
+#include "tessera/error.h"
 
 namespace tessera {
 
 class PlatformContext;
+
+/// The device has no memory for what is asked of it.
+class GlMemoryError : public GlError {
+  public:
+    using GlError::GlError;
+};
 
 /// How a context is made.
 struct GlContextOptions {
@@ -68,8 +75,8 @@ class GlContext {
     GlPlatform platform() const { return info_.platform; }
 
     /// Throws GlError with everything that went wrong since the last call: messages of OpenGL's debug output
-    /// that are errors or undefined behaviour of high severity, and glGetError. Throws InternalError when a
-    /// handle was destroyed on another thread.
+    /// that are errors or undefined behaviour of high severity, and glGetError; GlMemoryError when there was
+    /// no memory. Throws InternalError when a handle was destroyed on another thread.
     void throwIfFailed();
     /// Forgets what went wrong since the last call.
     void discardFailures() noexcept;

@@ -53,6 +53,7 @@
     X(FLUSHMAPPEDNAMEDBUFFERRANGE, FlushMappedNamedBufferRange) X(FRONTFACE, FrontFace) \
     X(GENERATETEXTUREMIPMAP, GenerateTextureMipmap) X(GENQUERIES, GenQueries) X(GETACTIVEUNIFORM, GetActiveUniform) \
     X(GETBOOLEANV, GetBooleanv) X(GETDOUBLEV, GetDoublev) X(GETERROR, GetError) X(GETFLOATV, GetFloatv) \
+    X(GETGRAPHICSRESETSTATUS, GetGraphicsResetStatus) \
     X(GETINTEGER64V, GetInteger64v) X(GETINTEGERI_V, GetIntegeri_v) X(GETINTEGERV, GetIntegerv) \
     X(GETINTERNALFORMATIV, GetInternalformativ) \
     X(GETNAMEDBUFFERPARAMETERI64V, GetNamedBufferParameteri64v) \

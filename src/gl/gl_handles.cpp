@@ -48,6 +48,17 @@ GLsync syncOf(std::uintptr_t name) {
     return reinterpret_cast<GLsync>(name);
 }
 
+/// Throws as GlContext::throwIfFailed(), and says what couldn't be had.
+void throwIfFailed(GlContext& context, const std::string& what) {
+    try {
+        context.throwIfFailed();
+    } catch (const GlMemoryError& error) {
+        throw GlMemoryError("no OpenGL " + what + ": " + error.what());
+    } catch (const GlError& error) {
+        throw GlError("no OpenGL " + what + ": " + error.what());
+    }
+}
+
 std::string incompleteReason(GLenum status) {
     switch (status) {
         case GL_FRAMEBUFFER_INCOMPLETE_ATTACHMENT:
@@ -73,11 +84,7 @@ GlBuffer::GlBuffer(GlContext& context, std::int64_t bytes, GLbitfield flags, con
     : GlHandle(context, createBuffer(context.functions())), bytes_(bytes) {
     context.throwIfFailed();
     gl().NamedBufferStorage(id(), std::max<GLsizeiptr>(bytes, 1), bytes > 0 ? source : nullptr, flags);
-    try {
-        context.throwIfFailed();
-    } catch (const GlError& error) {
-        throw GlError("no OpenGL buffer of " + std::to_string(bytes) + " bytes: " + error.what());
-    }
+    throwIfFailed(context, "buffer of " + std::to_string(bytes) + " bytes");
 }
 
 void* GlBuffer::map(std::int64_t offset, std::int64_t bytes, GLbitfield access) {
@@ -103,12 +110,8 @@ GlTexture::GlTexture(GlContext& context, GLenum target, GLenum internalFormat, i
         gl().TextureStorage2D(id(), 1, internalFormat, width, height);
     else
         gl().TextureStorage3D(id(), 1, internalFormat, width, height, depth);
-    try {
-        context.throwIfFailed();
-    } catch (const GlError& error) {
-        throw GlError("no OpenGL texture of " + std::to_string(width) + " x " + std::to_string(height) +
-                      " x " + std::to_string(depth) + " texels: " + error.what());
-    }
+    throwIfFailed(context, "texture of " + std::to_string(width) + " x " + std::to_string(height) + " x " +
+                               std::to_string(depth) + " texels");
     gl().TextureParameteri(id(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     gl().TextureParameteri(id(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     for (const GLenum axis : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})

@@ -114,9 +114,11 @@ std::unique_ptr<PictureSource> openPictureSource(const std::string& input, const
     const MeshFile file = openMesh(input, {}, job);
     std::unique_ptr<MeshSource> source = makeMeshSource(input, file.mesh, scene, 0, thread, job.execution);
     source->setFocus(scene);
-    source->live().scheduler().finish(job.execution);
-    source->live().update(BrickScheduler::Clock::now(), job.execution);
-    if (source->live().scheduler().isCutShort())
+    do source->live().scheduler().finish(job.execution);
+    while (!source->live().update(BrickScheduler::Clock::now(), job.execution));
+    if (source->live().isDeviceFull())
+        job.fellShort("the OpenGL device has no memory for as many bricks as the focus asks for");
+    else if (source->live().scheduler().isCutShort())
         job.fellShort(fmt::format("a budget of {:.3g} MB holds fewer bricks than the focus asks for",
                                   1e-6 * double(scene.bricks.budgetBytes)));
     return source;

@@ -1,6 +1,7 @@
 #include "pool/brick_pool.h"
 
 #include <algorithm>
+#include <atomic>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -43,6 +44,7 @@ struct BrickPool::Device {
     GlContext* context = nullptr;
     std::vector<GlTexture> codes, coverage;  // atlas by atlas, group by group
     int layers = 0;                          // of slots along z, those of the last atlas
+    std::atomic<bool> isFull = false;        // it stays as large as it is; any thread may look
     std::vector<std::unique_ptr<IndexCopy>> copies;
     IndexCopy* shown = nullptr;
     std::vector<std::uint32_t> freeSlots;
@@ -190,6 +192,10 @@ std::int64_t BrickPool::deviceBytes() const {
     });
 }
 
+bool BrickPool::isDeviceFull() const {
+    return device_->isFull;
+}
+
 int BrickPool::atlases() const {
     return int(device_->codes.size() / coding_.groupCount());
 }
@@ -248,7 +254,11 @@ std::optional<std::vector<std::uint32_t>> BrickPool::takeSlots(std::size_t count
         // By half, so that copying what there is stays cheap for each slot.
         while (free.size() < count && madeSlots() < capacity()) {
             const int layers = device_->layers % layout_.slots.z;
-            grow(context, std::min(layout_.slots.z, layers + std::max(1, layers / 2)));
+            try {
+                grow(context, std::min(layout_.slots.z, layers + std::max(1, layers / 2)));
+            } catch (const GlMemoryError&) {
+                device_->isFull = true;
+            }
         }
         while (free.size() < count && device_->waitForOne()) device_->freeRetired();
         if (free.size() < count) return std::nullopt;

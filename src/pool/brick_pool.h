@@ -71,7 +71,9 @@ class BrickPool {
     int brickCells() const { return layout_.edge - 1; }
     const TexelCoding& coding() const { return coding_; }
     const SlotLayout& layout() const { return layout_; }
-    std::size_t capacity() const { return layout_.capacity(); }
+    /// Slots that there may be: fewer than the budget allows once the device had no memory for more.
+    std::size_t capacity() const { return isDeviceFull() ? madeSlots() : layout_.capacity(); }
+    bool isDeviceFull() const;
     /// Of textures and buffers as they are now.
     std::int64_t deviceBytes() const;
     /// Made so far. To be used on the OpenGL thread.
@@ -89,7 +91,8 @@ class BrickPool {
     std::size_t freeSlots();
 
     /// Takes so many slots, or none when there aren't as many that no state holds; waits for the device
-    /// rather than give none.
+    /// rather than give none. Where the device has no memory for a texture that grows, the pool stays as
+    /// large as it is.
     std::optional<std::vector<std::uint32_t>> takeSlots(std::size_t count);
     /// Slots that no state shown refers to, or none that is held nor will be taken.
     void giveBack(std::span<const std::uint32_t> slots);

@@ -164,6 +164,8 @@ bool PoolTarget::findSlots(std::vector<Work>& work) {
     std::optional<std::vector<std::uint32_t>> slots = pool_.takeSlots(work.size());
     const bool isInPlace = !slots;
     if (isInPlace) {
+        // The pool may have turned out to be smaller.
+        if (isTooSmall()) return false;
         // Without a frame that reads them slots may be written where they stand.
         if (pool_.isHeld()) return false;
         for (const BrickInPool& gone : gone_) {

@@ -41,8 +41,9 @@ struct BrickInPool {
 /// one whole state to the next, as the scheduler does, but may be behind it: where states that frames hold
 /// leave no room for the next one it is shown by a later publication, or by catchUp().
 ///
-/// A scheduler whose budget is budgetBytes() never shows more bricks than the pool holds. With one that does
-/// the pool stays as it was until there are fewer again, and catchUp() throws InputError.
+/// A scheduler whose budget is budgetBytes() never shows more bricks than the pool holds. With one that does,
+/// as when the device had no memory for as many, the pool stays as it was until there are fewer again, and
+/// catchUp() throws InputError.
 class PoolTarget : public BrickTarget {
   public:
     /// Pool and mesh must outlive it; nobody else may write into the pool. @param fields those of the
@@ -65,6 +66,8 @@ class PoolTarget : public BrickTarget {
     /// and InputError when the pool is too small for so many bricks.
     bool catchUp();
     bool isBehind() const { return isBehind_; }
+    /// More bricks are shown than the pool holds.
+    bool isTooSmall() const { return bricks_.leafCount() > pool_.capacity(); }
 
     /// What was published last.
     const ShownBricks& bricks() const { return bricks_; }
@@ -91,7 +94,6 @@ class PoolTarget : public BrickTarget {
         IndexBox part;
     };
 
-    bool isTooSmall() const { return bricks_.leafCount() > pool_.capacity(); }
     std::vector<Touched> touchedBy(const Publication& publication) const;
     std::vector<PointValues> valuesOf(const std::vector<Touched>& touched) const;
     void note(const GrowingLeaf& leaf, const IndexBox& part);

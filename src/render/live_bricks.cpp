@@ -1,6 +1,9 @@
 #include "render/live_bricks.h"
 
+#include <string>
 #include <utility>
+
+#include "tessera/error.h"
 
 namespace tessera {
 
@@ -62,6 +65,14 @@ std::span<const PlacedBrick> LiveBricks::bricks() {
 
 bool LiveBricks::update(BrickScheduler::Clock::time_point deadline, const Execution& execution) {
     const bool isAtRest = scheduler_->update(deadline, execution);
+    if (filling_->isTooSmall()) {
+        const std::int64_t bytes = filling_->budgetBytes(scheduler_->brickBytes());
+        if (bytes < scheduler_->leastBudgetBytes())
+            throw GlMemoryError("the OpenGL device has no memory for more than " +
+                                std::to_string(pool_->capacity()) + " bricks");
+        scheduler_->setBudget(bytes);
+        return false;
+    }
     return (!filling_->isBehind() || filling_->catchUp()) && isAtRest;
 }
 
@@ -74,12 +85,6 @@ void LiveBricks::moveTo(GlThread& thread) {
     for (const GrowingLeaf& leaf : scheduler_->tree().leaves())
         all.push_back({leaf, scheduler_->samples(leaf.key)});
     if (!all.empty()) filling_->publish({.removed = {}, .added = all, .tree = &scheduler_->tree()});
-}
-
-void LiveBricks::setBudget(std::int64_t budgetBytes) {
-    scheduler_->setBudget(budgetBytes);
-    budgetBytes_ = budgetBytes;
-    moveTo(pool_->thread());
 }
 
 }  // namespace tessera

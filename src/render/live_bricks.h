@@ -29,14 +29,16 @@ class LiveBricks {
     /// What pool().state() shows; nothing before the coarsest bricks are there.
     std::span<const PlacedBrick> bricks();
 
-    /// BrickScheduler::update(), and what it publishes is shown. True at rest, with everything shown.
+    /// BrickScheduler::update(), and what it publishes is shown. True at rest, with everything shown. Where
+    /// the device has no memory for as many bricks as the budget allows, the budget becomes what there is.
+    /// Throws GlMemoryError where that doesn't hold the coarsest bricks.
     bool update(BrickScheduler::Clock::time_point deadline, const Execution& execution);
 
     /// Another device takes the place of the one before, which may be lost: everything is uploaded again.
     /// Throws GlError.
     void moveTo(GlThread& thread);
-    /// BrickScheduler::setBudget(), and a pool to match.
-    void setBudget(std::int64_t budgetBytes);
+    /// Since the device has no memory for more bricks there are fewer than the budget allows.
+    bool isDeviceFull() const { return pool_->isDeviceFull(); }
 
   private:
     class Target;

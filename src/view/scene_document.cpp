@@ -1,5 +1,6 @@
 #include "view/scene_document.h"
 
+#include <filesystem>
 #include <utility>
 
 #include "files/atomic_file.h"
@@ -15,16 +16,24 @@ constexpr std::size_t kMostSteps = 200;
 }  // namespace
 
 SceneDocument::SceneDocument() {
-    take({{"version", 1}});
-    steps_ = {json_};
+    restart({{"version", 1}});
 }
 
 SceneDocument SceneDocument::read(const std::string& path) {
-    readScene(path);  // strictly, with the file's name in what it says
+    const Scene scene = readScene(path);  // strictly, with the file's name in what it says
+    Json json = Json::parse(readWholeFile(path));
+    const Json::json_pointer mesh("/effects/outline/mesh");
+    if (json.contains(mesh)) json[mesh] = std::filesystem::absolute(scene.outline.mesh).string();
     SceneDocument document;
-    document.take(Json::parse(readWholeFile(path)));
-    document.steps_ = {document.json_};
+    document.restart(std::move(json));
     return document;
+}
+
+void SceneDocument::restart(Json json) {
+    take(std::move(json));
+    steps_ = {json_};
+    at_ = 0;
+    endDrag();
 }
 
 void SceneDocument::take(Json json) {

@@ -15,7 +15,7 @@ class SceneDocument {
     using Json = nlohmann::ordered_json;
 
     SceneDocument();
-    /// Throws as readScene() does.
+    /// Throws as readScene() does. Paths in it are made absolute: it may be saved in another folder.
     static SceneDocument read(const std::string& path);
 
     const Json& json() const { return json_; }
@@ -28,6 +28,8 @@ class SceneDocument {
     /// changes. @param isStep false: goes on with what the change before has begun, as while something is
     /// dragged, so that undo() takes both back at once.
     void change(Json json, bool isStep = true);
+    /// The same, and what was before is forgotten: undo() doesn't lead there.
+    void restart(Json json);
     /// Ends what is being dragged: the next change is a step.
     void endDrag() { isDragged_ = false; }
     /// The same for a change while something is dragged: the first one is a step.

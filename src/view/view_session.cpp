@@ -86,6 +86,17 @@ void warmUp(SliceRenderer& renderer, GlThread& thread, const Scene& scene) {
     renderer.draw(pool, *pool.state(), {Vec3d(0), 1, cells}, placeBricks(target, 0), options, {});
 }
 
+/// Of another file's scene what isn't about its place and its values stays.
+SceneDocument forAnotherFile(SceneDocument::Json json) {
+    for (const char* key : {"field", "component", "camera", "transfer_function", "layer", "clip", "unit",
+                            "bookmarks", "effects"})
+        json.erase(key);
+    if (json.contains("bricks")) json["bricks"].erase("focus");
+    SceneDocument document;
+    document.restart(std::move(json));
+    return document;
+}
+
 }  // namespace
 
 /// Sentences from any thread.
@@ -122,7 +133,7 @@ ViewSession::ViewSession(const Job& job, const ViewOptions& options)
 }
 
 ViewSession::~ViewSession() {
-    isEnding_ = true;
+    isEnding_ = isGivenUp_ = true;
     if (opening_.valid()) opening_.wait();
     if (warming_.valid()) warming_.wait();
     // Before the thread that they live on.
@@ -132,22 +143,27 @@ ViewSession::~ViewSession() {
 }
 
 void ViewSession::open(const std::string& path) {
-    if (isOpening()) throw InputError(openingPath_ + " is still being opened");
-    if (source_) {
-        // Of another file's scene what isn't about its place and its values stays.
-        SceneDocument::Json json = document_.json();
-        for (const char* key : {"field", "component", "camera", "transfer_function", "layer", "clip", "unit",
-                                "bookmarks", "effects"})
-            json.erase(key);
-        if (json.contains("bricks")) json["bricks"].erase("focus");
-        document_.change(std::move(json));
+    if (isOpening()) {
+        isGivenUp_ = true;
+        next_ = path;
+        return;
     }
     begin(path, nullptr);
 }
 
+void ViewSession::useScene(SceneDocument::Json json) {
+    if (!isOpening() || !(opensAnotherFile_ || next_)) return document_.change(std::move(json));
+    SceneDocument().change(json);  // is one
+    nextScene_ = std::move(json);
+}
+
 void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile> file) {
     openingPath_ = path;
-    const Scene scene = sceneNow();
+    isGivenUp_ = false;
+    // A scene that came first is for the file that comes first, even where that can't be opened.
+    opensAnotherFile_ = opened_ && path != path_;
+    const Scene scene = opensAnotherFile_ ? sized(forAnotherFile(document_.json()).scene()) : sceneNow();
+    if (!opensAnotherFile_) opened_ = scene;
     if (!source_)
         warming_ = std::async(std::launch::async, [this, scene = Scene(scene)]() mutable {
             scene.camera = {};
@@ -156,39 +172,47 @@ void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile>
             } catch (const std::exception&) {  // what is wrong is told where the picture is drawn
             }
         });
-    opened_ = scene;
-    opening_ = std::async(std::launch::async, [this, path, file = std::move(file), scene]() mutable {
-        Opened opened{path, std::move(file), nullptr};
+    Opened begun{path, std::move(file), scene, nullptr};
+    opening_ = std::async(std::launch::async, [this, opened = std::move(begun)]() mutable {
+        const Scene& asked = opened.scene;
         Job job = job_;
-        if (isVdbName(path)) {
-            opened.source = openVdbSource(path, scene.field, scene.component, *thread_, job);
-            return opened;
+        job.execution.cancel = &isGivenUp_;
+        if (isVdbName(opened.path)) {
+            opened.source = openVdbSource(opened.path, asked.field, asked.component, *thread_, job);
+            return std::move(opened);
         }
-        if (!opened.file) opened.file = std::make_shared<const MeshFile>(openMesh(path, {}, job));
+        if (!opened.file) opened.file = std::make_shared<const MeshFile>(openMesh(opened.path, {}, job));
         const int threads = sharesProcessor_ ? 0 : std::max(1, job.execution.threadCount() - 1);
-        opened.source = makeMeshSource(path, opened.file->mesh, scene, threads, *thread_, job.execution);
-        return opened;
+        opened.source =
+            makeMeshSource(opened.path, opened.file->mesh, asked, threads, *thread_, job.execution);
+        return std::move(opened);
     });
 }
 
-/// True where something was opened.
-bool ViewSession::takeOpened() {
-    if (!isOpening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return false;
+void ViewSession::takeOpened() {
+    if (!isOpening() || opening_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     if (warming_.valid()) warming_.get();
-    Opened opened = opening_.get();
+    std::future<Opened> ready = std::move(opening_);
+    if (next_) {
+        begin(*std::exchange(next_, std::nullopt), nullptr);
+        return;
+    }
+    const auto scene = std::exchange(nextScene_, std::nullopt);
+    Opened opened = ready.get();
+    if (scene || opensAnotherFile_)
+        document_.restart(scene ? *scene : forAnotherFile(document_.json()).json());
+    opened_ = opened.scene;
     source_ = std::move(opened.source);
-    effectsOf_.reset();
+    effectsOf_ = nullptr;
     mesh_ = dynamic_cast<MeshSource*>(source_.get());
     file_ = std::move(opened.file);
     path_ = opened.path;
     followed_ = 0;
     isRefined_ = mesh_ == nullptr;
     shown_ = {};
-    return true;
 }
 
-Scene ViewSession::sceneNow() const {
-    Scene scene = document_.scene();
+Scene ViewSession::sized(Scene scene) const {
     if (width_ > 0 && height_ > 0) scene.width = width_, scene.height = height_;
     return scene;
 }
@@ -196,8 +220,12 @@ Scene ViewSession::sceneNow() const {
 /// What can't be made of the source is left out, and noted.
 Scene ViewSession::completeScene() {
     Scene scene = sceneNow();
-    if (effectsOf_ != document_.revision()) {
-        effectsOf_ = document_.revision();
+    // A mesh's edges take long: they aren't found again for every step of a camera that is dragged.
+    SceneDocument::Json effectsNow = SceneDocument::Json::array();
+    for (const char* key : {"effects", "background", "unit", "length_unit"})
+        effectsNow.push_back(document_.json().contains(key) ? document_.json()[key] : nullptr);
+    if (effectsOf_ != effectsNow) {
+        effectsOf_ = std::move(effectsNow);
         effects_.clear();
         for (const Effect& effect : scene.effects) {
             Scene one = scene;
@@ -372,8 +400,8 @@ std::string ViewSession::status() const {
     }
     const std::string bricks = fmt::format("{} bricks", source_->bricks().size());
     if (mesh_ && mesh_->live().scheduler().isCutShort())
-        return bricks + ", as many as the budget holds" +
-               (hasConverged() ? "; the picture has converged" : "");
+        return bricks + ", as many as the " + (mesh_->live().isDeviceFull() ? "device" : "budget") +
+               " holds" + (hasConverged() ? "; the picture has converged" : "");
     return bricks + (hasConverged() ? ", the picture has converged" : "");
 }
 
@@ -479,14 +507,31 @@ void ViewSession::saveScene(const std::string& path) {
 }
 
 void ViewSession::recover() {
-    if (opening_.valid()) opening_.wait();
+    auto made = options_.makeThread(chooseGlPlatform(options_.platform));
     if (warming_.valid()) warming_.get();
-    renderer_.reset();
-    std::unique_ptr<GlThread> lost = std::move(thread_);
-    thread_ = options_.makeThread(chooseGlPlatform(options_.platform));
-    if (source_) source_->moveTo(*thread_);
-    renderer_ = std::make_unique<SliceRenderer>(*thread_);
+    // What is being opened is on the device that is lost, but the mesh that was read isn't.
+    const bool wasOpening = isOpening();
+    std::shared_ptr<const MeshFile> file;
+    if (wasOpening) try {
+            file = opening_.get().file;
+        } catch (const std::exception&) {  // it will be told again
+        }
+    renderer_ = std::make_unique<SliceRenderer>(*made);
+    const std::unique_ptr<GlThread> lost = std::exchange(thread_, std::move(made));
     shown_ = {};
+    try {
+        if (source_) source_->moveTo(*thread_);
+    } catch (...) {
+        mesh_ = nullptr;
+        source_.reset();
+        path_.clear();
+        throw;
+    }
+    if (!source_) opened_.reset();
+    if (next_)
+        begin(*std::exchange(next_, std::nullopt), nullptr);
+    else if (wasOpening)
+        begin(openingPath_, std::move(file));
 }
 
 }  // namespace tessera

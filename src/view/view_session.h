@@ -51,10 +51,13 @@ class ViewSession {
     ViewSession(const Job& job, const ViewOptions& options);
     ~ViewSession();
 
-    /// Begins to read a mesh or a .vdb file; what is shown stays until it is there. The scene keeps what
-    /// isn't the file's: camera, transfer function and places are dropped when another file was shown before.
+    /// Begins to read a mesh or a .vdb file; what is shown stays until it is there, and goes on being shown
+    /// where it can't be opened. One that is still being read is given up. The scene keeps what isn't the
+    /// file's: field, camera, transfer function and places are dropped for any file but the first.
     void open(const std::string& path);
     bool isOpening() const { return opening_.valid(); }
+    /// A scene that was made elsewhere: for the file that is being opened, else for the one that is shown.
+    void useScene(SceneDocument::Json json);
     /// Of what is shown; empty: nothing.
     const std::string& path() const { return path_; }
 
@@ -117,7 +120,8 @@ class ViewSession {
 
     /// Frames are noted as moving as long as this wasn't called for a while.
     void touch() { touched_ = Clock::now(); }
-    /// As it is for a device that is lost: everything moves to a new one.
+    /// As it is for a device that is lost: everything moves to a new one. Throws GlError where there is none,
+    /// and when it has no memory; then what is shown may be gone, but not the scene.
     void recover();
     const GlDeviceInfo& device() const { return thread_->info(); }
 
@@ -125,6 +129,7 @@ class ViewSession {
     struct Opened {
         std::string path;
         std::shared_ptr<const MeshFile> file;  // null: a .vdb file
+        Scene scene;                           // that the source is for
         std::unique_ptr<PictureSource> source;
     };
     /// What a picture is of.
@@ -137,9 +142,10 @@ class ViewSession {
     };
 
     void begin(const std::string& path, std::shared_ptr<const MeshFile> file);
-    bool takeOpened();
+    void takeOpened();
     void follow();
-    Scene sceneNow() const;
+    Scene sized(Scene scene) const;
+    Scene sceneNow() const { return sized(document_.scene()); }
     Scene completeScene();
     bool isMoving() const;
     bool sample(double ms);
@@ -162,13 +168,17 @@ class ViewSession {
     MeshSource* mesh_ = nullptr;
     std::future<Opened> opening_;
     std::string openingPath_;
+    std::atomic<bool> isGivenUp_ = false;  // what is being opened
+    bool opensAnotherFile_ = false;        // than the one shown, or the first one
+    std::optional<std::string> next_;      // to be opened in its place
+    std::optional<SceneDocument::Json> nextScene_;
     std::future<void> warming_;
     std::atomic<bool> isEnding_ = false;
 
-    std::size_t followed_ = 0;              // revision of the document that the bricks follow
-    std::optional<Scene> opened_;           // what the source was opened for
-    std::vector<Effect> effects_;           // of the scene, with what they take of the source
-    std::optional<std::size_t> effectsOf_;  // revision of the document that they are of
+    std::size_t followed_ = 0;       // revision of the document that the bricks follow
+    std::optional<Scene> opened_;    // what the source was opened for, or couldn't be
+    std::vector<Effect> effects_;    // of the scene, with what they take of the source
+    SceneDocument::Json effectsOf_;  // that of the scene which they are of
     bool isRefined_ = false;
     int width_ = 0, height_ = 0;
     Clock::time_point touched_, lastDrawn_;

@@ -1,4 +1,4 @@
-"""Drops a file onto a window as a file manager does (XDND 5): drop_file.py WINDOW FILE."""
+"""Drops files onto a window as a file manager does (XDND 5): drop_file.py WINDOW FILE..."""
 import sys
 import time
 
@@ -6,7 +6,7 @@ from Xlib import X, Xatom, display
 from Xlib.protocol import event
 
 
-def drop(window_id, path):
+def drop(window_id, paths):
     connection = display.Display()
     screen = connection.screen()
     atom = connection.intern_atom
@@ -38,7 +38,7 @@ def drop(window_id, path):
             asked = True
             send("XdndDrop", 0, X.CurrentTime)
         elif got.type == X.SelectionRequest:
-            got.requestor.change_property(got.property, got.target, 8, f"file://{path}\r\n".encode())
+            got.requestor.change_property(got.property, got.target, 8, "".join(f"file://{path}\r\n" for path in paths).encode())
             got.requestor.send_event(event.SelectionNotify(time=got.time, requestor=got.requestor, selection=got.selection,
                                                            target=got.target, property=got.property))
             connection.flush()
@@ -48,4 +48,4 @@ def drop(window_id, path):
 
 
 if __name__ == "__main__":
-    drop(int(sys.argv[1]), sys.argv[2])
+    drop(int(sys.argv[1]), sys.argv[2:])

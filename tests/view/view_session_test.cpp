@@ -5,14 +5,17 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <numbers>
 #include <thread>
 
 #include "brick_test_meshes.h"
 #include "gl_test_tools.h"
 #include "job/render_scene.h"
+#include "job/resample_files.h"
 #include "scene/scene_file.h"
 #include "tessera/error.h"
+#include "view/fresh_name.h"
 #include "vtu_text.h"
 
 namespace tessera {
@@ -151,7 +154,7 @@ TEST_F(ViewSessionTest, EffectsTakeWhatTheyNeedOfTheMesh) {
 TEST_F(ViewSessionTest, WhatMovesIsCoarseAndConvergesAtRest) {
     open();
     const RgbImage converged = session_->picture();
-    session_->setFrameMs(1);
+    session_->setFrameMs(1e-3);
     session_->takeFrames();
     session_->touch();
     edit([&](Json& json) {
@@ -215,6 +218,136 @@ TEST_F(ViewSessionTest, UndoAndRedoTakeBackDragsWhole) {
     EXPECT_EQ(document.scene().slicesAVoxel, 5);
 }
 
+/// A device whose 3D textures get no memory beyond a bound. One thread at a time.
+struct TextureMemory {
+    static inline std::int64_t mostTexels = std::numeric_limits<std::int64_t>::max();
+    static inline bool hasFailed = false;
+    static inline decltype(GlFunctions::TextureStorage3D) realStorage = nullptr;
+    static inline decltype(GlFunctions::GetError) realError = nullptr;
+
+    /// For GlContextOptions::replace.
+    static void bound(GlFunctions& gl) {
+        realStorage = gl.TextureStorage3D;
+        realError = gl.GetError;
+        gl.TextureStorage3D = [](GLuint texture, GLsizei levels, GLenum format, GLsizei width, GLsizei height,
+                                 GLsizei depth) {
+            hasFailed = std::int64_t(width) * height * depth > mostTexels;
+            if (!hasFailed) realStorage(texture, levels, format, width, height, depth);
+        };
+        gl.GetError = []() -> GLenum {
+            return std::exchange(hasFailed, false) ? GL_OUT_OF_MEMORY : realError();
+        };
+    }
+    explicit TextureMemory(std::int64_t texels) { mostTexels = texels; }
+    ~TextureMemory() { mostTexels = std::numeric_limits<std::int64_t>::max(); }
+};
+
+class SmallDevice : public ViewSessionTest {
+  protected:
+    void makeSmall() {
+        ViewOptions options;
+        options.platform = kPlatform;
+        options.makeThread = [](GlPlatform platform) {
+            return std::make_unique<GlThread>(platform, GlContextOptions{.replace = TextureMemory::bound});
+        };
+        session_ = std::make_unique<ViewSession>(Job{}, options);
+        session_->resize(90, 70);
+    }
+    std::size_t files() const {
+        return std::size_t(std::distance(std::filesystem::directory_iterator(folder_), {}));
+    }
+    /// More bricks than the texels that a pool has at first.
+    const Json kManyBricks = {
+        {"version", 1},
+        {"samples", 1},
+        {"bricks", {{"resolution", 193}, {"focus", {{{"place", {0, 0, 0}}, {"radius", 2}}}}}}};
+    /// A pool begins with about 3 million texels.
+    static constexpr std::int64_t kTexels = 4'000'000;
+};
+
+TEST_F(SmallDevice, ShowsAsManyBricksAsItHolds) {
+    makeSmall();
+    session_->document().change(kManyBricks);
+    {
+        const TextureMemory memory(kTexels);
+        open();
+        EXPECT_TRUE(session_->mesh()->live().isDeviceFull());
+        EXPECT_NE(session_->status().find("as many as the device holds"), std::string::npos)
+            << session_->status();
+        EXPECT_GT(session_->source()->bricks().size(), 300u);
+        EXPECT_LE(session_->source()->bricks().size(), session_->source()->pool().capacity());
+        // They go on following, within what there is.
+        const std::vector<std::uint8_t> before = session_->picture().rgb;
+        edit([](Json& json) { json["bricks"]["focus"][0] = {{"place", {0.9, 0, 0}}, {"radius", 0.3}}; });
+        settle();
+        EXPECT_TRUE(session_->hasConverged());
+        EXPECT_NE(session_->picture().rgb, before);
+    }
+    // One with more memory holds more.
+    session_->document().undo();
+    session_->recover();
+    settle();
+    EXPECT_FALSE(session_->mesh()->live().isDeviceFull());
+}
+
+TEST_F(SmallDevice, ThatHoldsNothingIsAnError) {
+    makeSmall();
+    const TextureMemory memory(1000);
+    session_->open(path_);
+    EXPECT_THROW(settle(), GlMemoryError);
+    settle();
+    EXPECT_EQ(session_->source(), nullptr);
+}
+
+TEST_F(SmallDevice, LeavesNoHalfPicture) {
+    ResampleRequest resample;
+    resample.inputs = {path_};
+    resample.output = (folder_ / "ball.vdb").string();
+    resample.format = &outputFormats().front();
+    resample.write.criterion = "uniform";
+    resample.refine.criterion = Criterion::uniform;
+    resample.refine.resolution = 33;
+    Job job;
+    resampleFiles(resample, job);
+    RenderRequest request;
+    request.output = (folder_ / "ball.png").string();
+    request.platform = kPlatform;
+    request.size = {90, 70};
+    GlThread& thread = sharedGlThread(kPlatform);
+    const auto replace = [&](const GlFunctions& by) {
+        thread.run([&](GlContext& context) { const_cast<GlFunctions&>(context.functions()) = by; });
+    };
+    const GlFunctions before = thread.run([](GlContext& context) { return context.functions(); });
+    GlFunctions bounded = before;
+    TextureMemory::bound(bounded);
+    replace(bounded);
+    const std::size_t there = files();
+    for (const std::string& input : {resample.output, path_}) {
+        const TextureMemory memory(1000);
+        request.input = input;
+        EXPECT_THROW(renderScene(request, job), GlMemoryError) << input;
+        EXPECT_EQ(files(), there);
+    }
+    // Of a mesh there may be fewer bricks, and that is said.
+    std::vector<std::string> said;
+    job.fellShort = [&](const std::string& sentence) { said.push_back(sentence); };
+    const std::string scene = (folder_ / "scene.json").string();
+    std::ofstream(scene) << kManyBricks;
+    request.scene = scene;
+    {
+        const TextureMemory memory(kTexels);
+        renderScene(request, job);
+    }
+    ASSERT_EQ(said.size(), 1u);
+    EXPECT_NE(said[0].find("no memory for as many bricks"), std::string::npos);
+    replace(before);
+    said.clear();
+    request.input = resample.output;
+    request.scene.clear();
+    renderScene(request, job);
+    EXPECT_TRUE(said.empty());
+}
+
 TEST_F(ViewSessionTest, AFieldAndBricksAreChosenAnew) {
     open();
     EXPECT_EQ(session_->source()->title(), "f");
@@ -242,6 +375,135 @@ TEST_F(ViewSessionTest, AFieldAndBricksAreChosenAnew) {
     EXPECT_THROW(settle(), std::exception);
     settle();
     EXPECT_EQ(session_->path(), path_);
+}
+
+TEST_F(ViewSessionTest, AnotherFileTakesThePlaceOfTheSceneOnlyWhenItIsThere) {
+    open();
+    edit([](Json& json) {
+        json["slices"] = 3;
+        json["effects"] = {{"axes", Json::object()}};
+        json["clip"] = {{"planes", {{{"normal", {0, 1, 0}}, {"offset", -0.2}}}}};
+    });
+    settle();
+    const Json before = session_->document().json();
+    const std::vector<std::uint8_t> shown = session_->picture().rgb;
+    session_->open((folder_ / "nowhere.vtu").string());
+    EXPECT_THROW(settle(), std::exception);
+    settle();
+    EXPECT_EQ(session_->document().json(), before);
+    EXPECT_TRUE(session_->hasConverged());
+    EXPECT_EQ(session_->picture().rgb, shown);
+    // The same file, again: nothing of the scene is another file's.
+    session_->open(path_);
+    settle();
+    EXPECT_EQ(session_->document().json(), before);
+    const std::string other = (folder_ / "other.vtu").string();
+    std::filesystem::copy_file(path_, other);
+    session_->open(other);
+    settle();
+    EXPECT_EQ(session_->path(), other);
+    EXPECT_FALSE(session_->document().json().contains("effects"));
+    EXPECT_FALSE(session_->document().json().contains("clip"));
+    EXPECT_EQ(session_->document().scene().slicesAVoxel, 3);
+    EXPECT_FALSE(session_->document().canUndo()) << "what was before is another file's";
+    // A scene that doesn't fit the first file isn't in the way of the next one.
+    make();
+    edit([](Json& json) { json["field"] = "none"; });
+    session_->open(path_);
+    EXPECT_THROW(settle(), InputError);
+    session_->open(other);
+    settle();
+    EXPECT_TRUE(session_->hasConverged());
+}
+
+TEST_F(ViewSessionTest, ASceneThatComesWithAFileIsForThatFile) {
+    open();
+    const std::string other = (folder_ / "other.vtu").string();
+    std::filesystem::copy_file(path_, other);
+    session_->open(other);
+    session_->useScene({{"version", 1}, {"field", "g"}, {"bricks", {{"resolution", 33}, {"cells", 8}}}});
+    EXPECT_EQ(session_->document().scene().field, "");
+    EXPECT_THROW(session_->useScene({{"version", 2}}), InputError);
+    settle();
+    EXPECT_EQ(session_->path(), other);
+    EXPECT_EQ(session_->source()->title(), "g");
+    session_->useScene({{"version", 1}, {"field", "f"}, {"bricks", {{"resolution", 33}, {"cells", 8}}}});
+    settle();
+    EXPECT_EQ(session_->source()->title(), "f");
+    EXPECT_TRUE(session_->document().canUndo());
+}
+
+TEST(FreshName, NeverNamesWhatIsThere) {
+    const std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("tessera-fresh-name-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder);
+    const std::string path = (folder / "my.picture.png").string();
+    EXPECT_EQ(freshName(path), path);
+    std::ofstream{path};
+    EXPECT_EQ(freshName(path), (folder / "my.picture-2.png").string());
+    std::filesystem::create_symlink("nowhere", folder / "my.picture-2.png");
+    EXPECT_EQ(freshName(path), (folder / "my.picture-3.png").string());
+    EXPECT_EQ(freshName("picture-of-nothing.png"), "picture-of-nothing.png");
+    std::filesystem::remove_all(folder);
+}
+
+TEST_F(ViewSessionTest, OfFilesOpenedAtOnceTheLastOneIsShown) {
+    const std::string other = (folder_ / "other.vtu").string();
+    std::filesystem::copy_file(path_, other);
+    session_->open(path_);
+    session_->open((folder_ / "nowhere.vtu").string());
+    session_->open(other);
+    settle();
+    EXPECT_EQ(session_->path(), other);
+    EXPECT_TRUE(session_->hasConverged());
+    EXPECT_TRUE(session_->takeMessages().empty());
+}
+
+TEST_F(ViewSessionTest, AContextThatIsLostWhileAFileIsReadIsReplaced) {
+    session_->open(path_);
+    session_->recover();
+    settle();
+    EXPECT_TRUE(session_->hasConverged());
+    session_->open(path_);
+    session_->open((folder_ / "nowhere.vtu").string());
+    session_->recover();
+    EXPECT_THROW(settle(), std::exception);
+    settle();
+    EXPECT_EQ(session_->path(), path_);
+    EXPECT_TRUE(session_->hasConverged());
+}
+
+TEST_F(ViewSessionTest, WithoutAnotherDeviceTheSceneIsNotLost) {
+    int left = 1;
+    ViewOptions options;
+    options.platform = kPlatform;
+    options.makeThread = [&](GlPlatform platform) {
+        if (left-- == 0) throw GlError("no other device");
+        return std::make_unique<GlThread>(platform);
+    };
+    session_ = std::make_unique<ViewSession>(Job{}, options);
+    session_->document().change({{"version", 1}, {"slices", 3}});
+    session_->resize(90, 70);
+    open();
+    EXPECT_THROW(session_->recover(), GlError);
+    const std::string scene = (folder_ / "scene.json").string();
+    session_->saveScene(scene);
+    EXPECT_EQ(readScene(scene).slicesAVoxel, 3);
+}
+
+TEST(SceneDocument, KeepsTheFilesThatASceneNames) {
+    const std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("tessera-scene-document-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder / "saved");
+    const std::string read = (folder / "scene.json").string(), saved = (folder / "saved/scene.json").string();
+    std::ofstream(read) << R"({"version": 1, "effects": {"outline": {"mesh": "wing.vtu"}}})";
+    const SceneDocument document = SceneDocument::read(read);
+    const std::string mesh = (folder / "wing.vtu").string();
+    EXPECT_EQ(document.scene().outline.mesh, mesh);
+    document.save(saved);
+    EXPECT_EQ(readScene(saved).outline.mesh, mesh);
+    EXPECT_FALSE(document.canUndo());
+    std::filesystem::remove_all(folder);
 }
 
 TEST_F(ViewSessionTest, SeesWhatIsUnderTheCursor) {

@@ -159,19 +159,21 @@ class Window(unittest.TestCase):
         self.key("ctrl+y")
         self.assertEqual(self.saved_scene(), scene)
         self.settle(mesh.name)
+        (self.folder / "picture.png").write_text("somebody else's")
         self.key("ctrl+p")
-        picture = self.folder / "picture.png"
+        picture = self.folder / "picture-2.png"
         self.wait("saves the picture", picture.exists)
+        self.assertEqual((self.folder / "picture.png").read_text(), "somebody else's")
         self.end()
         self.assertEqual(scene["size"], [WIDTH - PANEL, HEIGHT - STATUS])
         subprocess.run([arguments.tessera, "render", str(mesh), "--scene", "scene.json", "-o", "drawn.png", "--quiet"], check=True,
                        cwd=self.folder, timeout=PATIENCE)
-        shown, drawn = (Image.open(self.folder / name).convert("RGB") for name in ("picture.png", "drawn.png"))
+        shown, drawn = (Image.open(self.folder / name).convert("RGB") for name in (picture.name, "drawn.png"))
         self.assertEqual(shown.size, drawn.size)
         self.assertLessEqual(max(high for _, high in ImageChops.difference(shown, drawn).getextrema()), 1)
         self.assertGreater(len(drawn.getcolors(1 << 24)), 100)
         if arguments.keep:
-            for name in ("picture.png", "drawn.png", "scene.json"):
+            for name in (picture.name, "drawn.png", "scene.json"):
                 shutil.copy(self.folder / name, arguments.keep)
 
     def test_windows_are_resized_minimised_and_closed_while_bricks_refine(self):
@@ -195,17 +197,32 @@ class Window(unittest.TestCase):
     def test_a_file_that_is_dropped_is_opened(self):
         data = arguments.data
         self.view()
-        for path, shown in ((data / "ccx-cavity/cavity.vtu", "cavity.vtu"),
-                            (self.folder / "first.json", "cavity.vtu"),
-                            (self.folder / "errors", "cavity.vtu"),  # no mesh: told, and nothing changes
-                            (data / "freefem-stokes-sphere/stokes_p1.vtu", "stokes_p1.vtu")):
-            dropped = subprocess.run([sys.executable, HERE / "drop_file.py", self.window, path.resolve()], env=self.environment,
-                                     capture_output=True, text=True, timeout=PATIENCE)
+        (self.folder / "scenes").mkdir()
+        scene = self.folder / "scenes/outline.json"
+        scene.write_text(json.dumps({"version": 1, "field": "p", "bricks": {"resolution": 65, "cells": 8},
+                                     "effects": {"outline": {"mesh": "../sphere.vtu"}}}))
+        shutil.copy(data / "freefem-stokes-sphere/stokes_p1.vtu", self.folder / "sphere.vtu")
+        (self.folder / "scene.json").write_text("somebody else's")
+        for paths, shown in (([data / "ccx-cavity/cavity.vtu"], "cavity.vtu"),
+                             ([self.folder / "first.json"], "cavity.vtu"),
+                             ([self.folder / "errors"], "cavity.vtu"),  # no mesh: told, and nothing changes
+                             ([scene, self.folder / "sphere.vtu"], "sphere.vtu")):
+            dropped = subprocess.run([sys.executable, HERE / "drop_file.py", self.window, *(path.resolve() for path in paths)],
+                                     env=self.environment, capture_output=True, text=True, timeout=PATIENCE)
             self.assertEqual(dropped.returncode, 0, dropped.stderr)
             self.settle(shown)
         self.shot("dropped")
-        self.do("windowclose", self.window)
-        self.program.wait(PATIENCE)
+        # Nothing that is there is written over; what a scene names is found from where it is saved.
+        self.key("ctrl+s")
+        saved = self.folder / "scene-2.json"
+        self.wait("saves the scene", saved.exists)
+        self.assertEqual((self.folder / "scene.json").read_text(), "somebody else's")
+        mesh = json.loads(saved.read_text())["effects"]["outline"]["mesh"]
+        self.assertTrue(os.path.isabs(mesh))
+        self.assertTrue(os.path.samefile(mesh, self.folder / "sphere.vtu"))
+        self.key("alt+F4")  # as the window manager's button does
+        self.assertEqual(self.program.wait(PATIENCE), 0)
+        self.assertEqual((self.folder / "errors").read_text(), "")
 
     def test_without_a_display_there_is_one_line(self):
         environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
