@@ -533,7 +533,8 @@ void Window::giveUp() {
 void Window::openDropped() {
     std::vector<std::string> paths = std::exchange(screen_->dropped, {});
     const auto isScene = [](const std::string& path) { return path.ends_with(".json"); };
-    std::ranges::stable_partition(paths, [&](const std::string& path) { return !isScene(path); });
+    std::stable_partition(paths.begin(), paths.end(),
+                          [&](const std::string& path) { return !isScene(path); });
     for (const std::string& path : paths) try {
             isScene(path) ? session_.useScene(SceneDocument::read(path).json()) : session_.open(path);
         } catch (const std::exception& error) {

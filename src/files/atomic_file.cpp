@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -107,8 +108,14 @@ void AtomicFile::openNameless() {
     // Not every file system has files without a name.
     std::string name = (folder / "tessera-XXXXXX").string();
     descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
+    if (descriptor_ >= 0) {
+        ::unlink(name.c_str());
+        return;
+    }
+    // A bare container may have no folder that can be written.
+    descriptor_ = ::memfd_create("tessera", MFD_CLOEXEC);
     if (descriptor_ < 0) fail(temporaryPath_, reason(errno));
-    ::unlink(name.c_str());
+    temporaryPath_ = "a temporary file in memory";
 }
 
 AtomicFile::AtomicFile(const std::string& path) : path_(path) {
