@@ -168,9 +168,9 @@ class VdbSource : public PictureSource {
 std::unique_ptr<PictureSource> openVdbSource(const std::string& path, const std::string& field,
                                              std::optional<int> component, GlThread& thread, Job& job) {
     VdbFile file = readVdb(path);
+    const OutputField shown = chooseField(file, field);
+    titleOf(shown, component);
     try {
-        const OutputField shown = chooseField(file, field);
-        titleOf(shown, component);
         return std::make_unique<VdbSource>(std::move(file), shown, component, thread, job);
     } catch (const InputError& error) {
         throw InputError(path + ": " + error.what());

@@ -1297,7 +1297,7 @@ class Pictures(AppTest):
         self.reject(2, "scene.json bricks.cells 16", "render", self.cube, *out, "--scene", self.scene(bricks={"cells": 12}))
         self.reject(2, "scene.json bricks.focus", "render", self.cube, *out, "--scene", self.scene(bricks={"focus": [{}]}))
         self.reject(2, "--max-memory cube.vdb", "render", self.vdb, *out, "--max-memory", "1G")
-        self.reject(2, "cube.vdb none f", "render", self.vdb, *out, "--field", "none")
+        self.reject(2, "none f", "render", self.vdb, *out, "--field", "none")
         self.reject(2, "component 3", "render", self.vdb, *out, "--component", "3")
         self.reject(2, "png exr", "render", self.vdb, "-o", "out.jpg")
         self.reject(2, "--size 0x4", "render", self.vdb, *out, "--size", "0x4")
