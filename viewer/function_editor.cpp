@@ -61,7 +61,8 @@ bool editFunction(ViewSession& session) {
         return false;
     }
     const ImVec2 low = ImGui::GetCursorScreenPos();
-    const ImVec2 size(ImGui::GetContentRegionAvail().x, kHeight);
+    const float scale = ImGui::GetIO().FontGlobalScale;
+    const ImVec2 size(ImGui::GetContentRegionAvail().x, kHeight * scale);
     ImGui::InvisibleButton("opacities", size,
                            ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
     const bool isHovered = ImGui::IsItemHovered();
@@ -85,7 +86,7 @@ bool editFunction(ViewSession& session) {
     draw.AddLine({low.x, at(points.front()).y}, at(points.front()), line, 2);
     draw.AddLine(at(points.back()), {low.x + size.x, at(points.back()).y}, line, 2);
     for (std::size_t i = 1; i < points.size(); ++i) draw.AddLine(at(points[i - 1]), at(points[i]), line, 2);
-    for (const auto& point : points) draw.AddCircleFilled(at(point), 4, line);
+    for (const auto& point : points) draw.AddCircleFilled(at(point), 4 * scale, line);
     // The colours below.
     const float top = low.y + size.y + 3;
     constexpr int kColours = 64;
@@ -111,7 +112,7 @@ bool editFunction(ViewSession& session) {
     const auto nearest = [&] {
         for (std::size_t i = 0; i < points.size(); ++i) {
             const ImVec2 p = at(points[i]);
-            if (std::hypot(p.x - mouse.x, p.y - mouse.y) < kReach) return int(i);
+            if (std::hypot(p.x - mouse.x, p.y - mouse.y) < kReach * scale) return int(i);
         }
         return -1;
     };

@@ -43,12 +43,12 @@ void change(ViewSession& session, PanelState& state, const std::function<void(Js
 bool slider(ViewSession& session, PanelState& state, const char* label, const Json& object,
             const std::function<Json&(Json&)>& objectIn, const char* key, double low, double high,
             double otherwise, bool isLogarithmic = false) {
-    auto value = float(numberAt(object, key, otherwise));
-    const bool moved = ImGui::SliderFloat(label, &value, float(low), float(high), "%.3g",
-                                          isLogarithmic ? ImGuiSliderFlags_Logarithmic : 0);
+    double value = numberAt(object, key, otherwise);
+    const bool moved = ImGui::SliderScalar(label, ImGuiDataType_Double, &value, &low, &high, "%.4g",
+                                           isLogarithmic ? ImGuiSliderFlags_Logarithmic : 0);
     if (moved)
         change(
-            session, state, [&](Json& json) { objectIn(json)[key] = double(value); }, true);
+            session, state, [&](Json& json) { objectIn(json)[key] = value; }, true);
     if (ImGui::IsItemDeactivated()) session.document().endDrag();
     return ImGui::IsItemActive();
 }
@@ -67,28 +67,31 @@ bool drawData(ViewSession& session, PanelState& state) {
     ImGui::TextWrapped("%s", session.path().c_str());
     if (ImGui::BeginCombo("field", source.title().c_str())) {
         for (const PictureField& field : source.fields()) {
+            ImGui::PushID(&field);  // a name may be empty
             if (ImGui::Selectable(field.name.c_str()))
                 change(session, state, [&](Json& to) {
                     to["field"] = field.name;
                     to.erase("component");
                     to.erase("transfer_function");
                 });
-            if (field.components == 1) continue;
-            for (int c = 0; c < field.components; ++c)
+            for (int c = 0; field.components > 1 && c < field.components; ++c)
                 if (ImGui::Selectable(fmt::format("    {} {}", field.name, c).c_str()))
                     change(session, state, [&](Json& to) {
                         to["field"] = field.name;
                         to["component"] = c;
                         to.erase("transfer_function");
                     });
+            ImGui::PopID();
         }
         ImGui::EndCombo();
     }
     ImGui::Text("values %.5g to %.5g", source.range().min, source.range().max);
     auto unit = json.contains("unit") ? json["unit"].get<std::string>() : std::string();
     if (ImGui::InputText("unit", &unit))
-        change(session, state,
-               [&](Json& to) { unit.empty() ? void(to.erase("unit")) : void(to["unit"] = unit); });
+        change(
+            session, state,
+            [&](Json& to) { unit.empty() ? void(to.erase("unit")) : void(to["unit"] = unit); }, true);
+    if (ImGui::IsItemDeactivated()) session.document().endDrag();
     return false;
 }
 
@@ -246,6 +249,7 @@ const std::vector<EffectEntry>& effectEntries() {
         {"scale_bar", "scale bar", {}},
         {"outline", "edges of the mesh", {{"angle", 1, 179, 30}}},
         {"bricks", "edges of bricks", {{"width", 0.5, 5, 1.5}, {"opacity", 0, 1, 0.8}}},
+        {"errors", "errors of bricks", {{"strength", 0, 1, 0.8}}},
     };
     return entries;
 }
@@ -352,6 +356,7 @@ bool drawEffects(ViewSession& session, PanelState& state) {
     for (const EffectEntry& entry : effectEntries()) {
         // A file has no mesh of its own.
         if (std::string(entry.name) == "outline" && !session.mesh()) continue;
+        if (std::string(entry.name) == "errors" && session.source()->brickErrors().empty()) continue;
         bool isOn = effects.contains(entry.name);
         ImGui::PushID(entry.name);
         if (ImGui::Checkbox(entry.title, &isOn)) toggleEffect(session, entry.name);
@@ -573,7 +578,7 @@ void drawStatus(const ViewSession& session, const PanelState& state, float left,
                                  ? double(progress.leavesShown) /
                                        double(std::max(progress.leavesPlanned, progress.leavesShown))
                                  : 0;
-        ImGui::ProgressBar(float(share), {120, 0}, "");
+        ImGui::ProgressBar(float(share), {120 * ImGui::GetIO().FontGlobalScale, 0}, "");
         ImGui::SameLine();
     }
     ImGui::TextUnformatted(line.c_str());
@@ -602,9 +607,10 @@ void drawHelp(PanelState& state) {
                                      {"T", "light or dark"},
                                      {"Tab", "hide or show the panel"},
                                      {"H, F1", "this help"},
+                                     {"Esc", "takes messages and help away"},
                                      {"Ctrl Q", "close"}}) {
         ImGui::TextUnformatted(keys);
-        ImGui::SameLine(190);
+        ImGui::SameLine(190 * ImGui::GetIO().FontGlobalScale);
         ImGui::TextUnformatted(what);
     }
     ImGui::TextDisabled("Drop a mesh, a .vdb file or a scene onto the window to open it.");

@@ -35,6 +35,8 @@ constexpr double kIdleMs = 120;
 constexpr double kFlyASecond = 0.8;
 /// From the eye to what it looks at, in sizes of the data.
 constexpr double kNearest = 1e-5, kFarthest = 1e3;
+/// A key or a button changes something in the first frame; what is new in the second is seen in the third.
+constexpr int kFramesOfInput = 3;
 constexpr float kHandleReach = 9;
 constexpr double kDoubleClickMs = 500;
 /// A device that is lost more often than that isn't tried again.
@@ -74,6 +76,7 @@ struct Window::Screen {
 
     int buttonsDown = 0;
     std::size_t inputs = 0;  ///< those that a picture at rest gives way to
+    int framesDue = 0;       ///< of the interface, before the next picture, which may take seconds
     std::vector<std::string> dropped;
     std::optional<std::array<double, 2>> lastMouse;
     bool isDragging = false;
@@ -131,6 +134,7 @@ Window::Window(ViewSession& session, const WindowOptions& options)
         Screen& s = Screen::of(w);
         s.buttonsDown += action == GLFW_PRESS ? 1 : -1;
         ++s.inputs;
+        s.framesDue = kFramesOfInput;
         if (button != GLFW_MOUSE_BUTTON_LEFT || action != GLFW_PRESS) return;
         // By events, as two clicks may come while one picture is drawn. When is known no better than that it
         // was after the events before: what a picture takes isn't the hand's.
@@ -151,6 +155,7 @@ Window::Window(ViewSession& session, const WindowOptions& options)
         Screen& s = Screen::of(w);
         const int key = keyOnLayout(place, scancode);
         ++s.inputs;
+        s.framesDue = kFramesOfInput;
         if (action == GLFW_PRESS) s.keys.push_back({key, mods});
         // One that began with Ctrl is no movement, whichever is let go first.
         if (action == GLFW_PRESS && (mods & GLFW_MOD_CONTROL) == 0) s.held.insert(key);
@@ -364,13 +369,14 @@ void drawHandles(ViewSession& session, ImDrawList& draw, int& held, bool isActiv
                  const std::array<double, 2>& movedPixels) {
     const std::vector<Handle> handles = handlesOf(session);
     const ImVec2 mouse = ImGui::GetIO().MousePos;
+    const float scale = ImGui::GetIO().FontGlobalScale;
     const double reachWorld = 0.1 * glm::length(session.source()->boundsWorld().size());
     for (std::size_t i = 0; i < handles.size(); ++i) {
         const Handle& handle = handles[i];
         const auto at = session.pixelOf(handle.placeWorld);
         if (!at) continue;
         const ImVec2 dot = onWindow(*at);
-        const bool isNear = std::hypot(dot.x - mouse.x, dot.y - mouse.y) < kHandleReach;
+        const bool isNear = std::hypot(dot.x - mouse.x, dot.y - mouse.y) < kHandleReach * scale;
         if (isNear && ImGui::IsItemClicked(ImGuiMouseButton_Left)) held = int(i);
         const bool isHeld = held == int(i) && isActive;
         const ImU32 colour = isNear || isHeld ? IM_COL32(255, 200, 60, 255) : IM_COL32(255, 140, 0, 220);
@@ -389,7 +395,7 @@ void drawHandles(ViewSession& session, ImDrawList& draw, int& held, bool isActiv
                 session.movedTo(handle.placeWorld, (*at)[0] + movedPixels[0], (*at)[1] + movedPixels[1]);
             moved[handle.at]["center"] = {place.x, place.y, place.z};
         }
-        draw.AddCircleFilled(dot, 6, colour);
+        draw.AddCircleFilled(dot, 6 * scale, colour);
         if (isHeld && (movedPixels[0] != 0 || movedPixels[1] != 0)) {
             session.document().drag(std::move(moved));
             session.touch();
@@ -597,7 +603,8 @@ void Window::run(const std::function<bool()>& isEnding) {
             session_.resize(framebufferWidth - int(std::lround(screen.panelWidth() * dense)),
                             framebufferHeight - int(std::lround(kStatusHeight * screen.scale * dense)));
         }
-        const bool hasWorked = drawPicture(isEnding);
+        const bool isFrameDue = screen.framesDue > 0 && isShown;
+        const bool hasWorked = !isFrameDue && drawPicture(isEnding);
         for (const std::string& message : session_.takeMessages()) tell(state, message);
         for (const FrameTime& frame : session_.takeFrames())
             state.frameMs = frame.ms, state.frameScale = frame.scale;
@@ -611,12 +618,14 @@ void Window::run(const std::function<bool()>& isEnding) {
         else if (session_.source() && !session_.hasConverged())
             named = "drawing - " + named;
         if (named != title) glfwSetWindowTitle(screen.window, (title = named).c_str());
-        isBusy = hasWorked || session_.isOpening();
+        isBusy = hasWorked || isFrameDue || session_.isOpening();
         const bool isPictureNew = session_.pictureNumber() != pictureNumber;
-        const bool isDue = isPictureNew || screen.inputs != inputs || msSince(drawn) > kIdleMs || !isBusy;
+        const bool isDue =
+            isPictureNew || screen.inputs != inputs || msSince(drawn) > kIdleMs || !isBusy || isFrameDue;
         if (isShown && isDue) {
             pictureNumber = session_.pictureNumber();
             inputs = screen.inputs;
+            screen.framesDue = std::max(0, screen.framesDue - 1);
             drawOnce(isPictureNew);
             drawn = Clock::now();
         } else if (!hasWorked && isBusy) {
