@@ -220,6 +220,14 @@ class Window(unittest.TestCase):
         mesh = json.loads(saved.read_text())["effects"]["outline"]["mesh"]
         self.assertTrue(os.path.isabs(mesh))
         self.assertTrue(os.path.samefile(mesh, self.folder / "sphere.vtu"))
+        # Keys are those that a keyboard shows: on a German one Z is where others have Y.
+        subprocess.run(["setxkbmap", "de"], env=self.environment, check=True, timeout=PATIENCE)
+        before = json.loads(saved.read_text())
+        saved.unlink()
+        for name in ("g", "ctrl+z", "ctrl+s"):
+            self.key(name)
+        self.wait("saves the scene", saved.exists)
+        self.assertEqual(json.loads(saved.read_text()), before)
         self.key("alt+F4")  # as the window manager's button does
         self.assertEqual(self.program.wait(PATIENCE), 0)
         self.assertEqual((self.folder / "errors").read_text(), "")
