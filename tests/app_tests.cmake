@@ -43,7 +43,7 @@ endif()
 
 # What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
 # nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
-set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams measure extend ray_cast mesh_cast
+set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams surface measure extend ray_cast mesh_cast
   contract_format contract_test hard_cases perturbed vdb image scene slice library cache)
 if(TESSERA_SANITIZE MATCHES thread)
   set(sanitized_areas base gl_test compare software contract_test brick_store refine schedule seams measure)

@@ -49,7 +49,7 @@ using TileMap = std::unordered_map<TileKey, Tile, BrickKeyHash>;
 /// The stored samples of a tree: exact samples at the points each leaf brick owns. A tile without a covered
 /// point is absent, so memory is that of the output. Bricks may be put from several threads at once, each
 /// brick once. Beside them it holds the extension: values at points outside the mesh, which may lie outside
-/// all bricks too.
+/// all bricks too, and the distances of points from the mesh's surface.
 class BrickStore {
   public:
     BrickStore() = default;
@@ -98,6 +98,11 @@ class BrickStore {
         return found != extension_.end() && found->second.covered(offsetInTile(p)) ? &found->second : nullptr;
     }
 
+    /// Tiles of one channel that say how far points at the mesh's surface are from it (SurfacePoints): those
+    /// of their coverage. Empty where nobody has measured.
+    const TileMap& surface() const { return surface_; }
+    TileMap& surface() { return surface_; }
+
     std::int64_t coveredPoints() const;
     std::int64_t memoryBytes() const;
 
@@ -107,7 +112,7 @@ class BrickStore {
     int tileCount_ = 0;
     std::size_t leafCount_ = 0;
     std::vector<std::unique_ptr<Tile>> tiles_;
-    TileMap extension_;
+    TileMap extension_, surface_;
 };
 
 template <class Keeps>

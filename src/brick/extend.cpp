@@ -12,7 +12,7 @@
 
 #include "base/floor_div.h"
 #include "base/parallel.h"
-#include "brick/leaf_tiles.h"
+#include "brick/closed_coverage.h"
 #include "brick/overlap.h"
 #include "tessera/error.h"
 #include "tessera/lattice.h"
@@ -25,59 +25,21 @@ constexpr std::int64_t kElementChunk = 4096;
 // A cell counts as touched within this many voxels: more than a place in it can be off by rounding.
 constexpr double kTouchSlack = 1.0 / 1024;
 
-bool fullyCovered(const BrickStore& store, std::size_t leaf) {
-    for (int t = 0; t < store.tileCount(); ++t) {
-        const Tile* tile = store.tile(leaf, t);
-        if (!tile) return false;
-        for (const std::uint64_t word : tile->coverage)
-            if (word != ~std::uint64_t(0)) return false;
-    }
-    return true;
-}
-
 /// The points of a leaf's closed box: which are covered, and which others touched cells need.
 class ClosedBox {
   public:
-    ClosedBox(const BrickTree& tree, const BrickStore& store, const Reconstruction& reconstruction,
-              std::size_t leaf)
+    /// @param covered of ClosedCoverage.
+    ClosedBox(const BrickTree& tree, std::size_t leaf, const std::vector<std::uint8_t>& covered)
         : edge_(tree.brickCells() + 1),
           first_(tree.ownedPoints(tree.leaves()[leaf]).min),
           covered_(words(), 0),
           needed_(words(), 0) {
-        const BrickKey& key = tree.leaves()[leaf];
-        const int b = tree.brickCells();
-        // The leaf itself and the next ones, which own the points on the + sides.
-        std::array<std::int64_t, 8> owners;
-        for (int side = 0; side < 8; ++side)
-            owners[std::size_t(side)] = tree.findLeaf({key.level, key.index + cornerOffset(side)});
-        const bool coarserNear = hasCoarserNeighbour(tree, leaf);
-        for (int x = 0; x < edge_; ++x)
-            for (int y = 0; y < edge_; ++y)
-                for (int z = 0; z < edge_; ++z) {
-                    const Vec3i local(x, y, z);
-                    const Vec3i next(x == b, y == b, z == b);
-                    const std::int64_t owner = owners[std::size_t(next.x | next.y << 1 | next.z << 2)];
-                    const bool onBorder = x == 0 || y == 0 || z == 0 || x == b || y == b || z == b;
-                    bool covered = false;
-                    if (owner >= 0 && !(onBorder && coarserNear))
-                        store.value(std::size_t(owner), local - next * b, 0, covered);
-                    else
-                        covered = reconstruction.isCovered(key.level, first_ + local);
-                    if (covered)
-                        set(covered_, at(local));
-                    else
-                        complete_ = false;
-                }
-    }
-    /// Whether all points are covered, told without looking at them; false may mean either.
-    static bool isSurelyComplete(const BrickTree& tree, const std::vector<std::uint8_t>& isFull,
-                                 std::size_t leaf) {
-        const BrickKey& key = tree.leaves()[leaf];
-        for (int side = 0; side < 8; ++side) {
-            const std::int64_t owner = tree.findLeaf({key.level, key.index + cornerOffset(side)});
-            if (owner < 0 || !isFull[std::size_t(owner)]) return false;
+        for (std::size_t i = 0; i < covered.size(); ++i) {
+            if (covered[i])
+                set(covered_, i);
+            else
+                complete_ = false;
         }
-        return !hasCoarserNeighbour(tree, leaf);
     }
     bool isComplete() const { return complete_; }
 
@@ -99,9 +61,9 @@ class ClosedBox {
     }
     template <class Visit>
     void forEachNeeded(const Visit& visit) const {
-        for (int x = 0; x < edge_; ++x)
+        for (int z = 0; z < edge_; ++z)
             for (int y = 0; y < edge_; ++y)
-                for (int z = 0; z < edge_; ++z)
+                for (int x = 0; x < edge_; ++x)
                     if (has(needed_, at({x, y, z}))) visit(first_ + Vec3i(x, y, z));
     }
 
@@ -110,8 +72,8 @@ class ClosedBox {
         return (std::size_t(edge_) * std::size_t(edge_) * std::size_t(edge_) + 63) / 64;
     }
     std::size_t at(const Vec3i& p) const {
-        return (std::size_t(p.x) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) +
-               std::size_t(p.z);
+        return (std::size_t(p.z) * std::size_t(edge_) + std::size_t(p.y)) * std::size_t(edge_) +
+               std::size_t(p.x);
     }
     static void set(std::vector<std::uint64_t>& bits, std::size_t i) {
         bits[i >> 6] |= std::uint64_t(1) << (i & 63);
@@ -163,17 +125,15 @@ class Extender {
           store_(store),
           reconstruction_(reconstruction),
           kept_(kept),
-          execution_(execution) {}
+          execution_(execution),
+          coverage_(tree, store, reconstruction, execution) {}
 
     /// What cells that the mesh touches need.
     void markNeeded() {
         boxes_.resize(tree_.leafCount());
-        std::vector<std::uint8_t> isFull(boxes_.size());
-        parallelFor(execution_, std::int64_t(boxes_.size()),
-                    [&](std::int64_t i) { isFull[std::size_t(i)] = fullyCovered(store_, std::size_t(i)); });
         parallelFor(execution_, std::int64_t(boxes_.size()), [&](std::int64_t i) {
-            if (ClosedBox::isSurelyComplete(tree_, isFull, std::size_t(i))) return;
-            auto box = std::make_unique<ClosedBox>(tree_, store_, reconstruction_, std::size_t(i));
+            if (coverage_.isSurelyWhole(std::size_t(i))) return;
+            auto box = std::make_unique<ClosedBox>(tree_, std::size_t(i), coverage_.of(std::size_t(i)));
             if (!box->isComplete()) boxes_[std::size_t(i)] = std::move(box);
         });
         parallelForChunks(execution_, mesh_.elementCount(), kElementChunk,
@@ -186,9 +146,11 @@ class Extender {
             if (!boxes_[std::size_t(i)]) return;
             const int level = tree_.leaves()[std::size_t(i)].level;
             boxes_[std::size_t(i)]->forEachNeeded([&](const Vec3i& p) {
-                reconstruction_.visitOutside(level, p, [&](int ownerLevel, const Vec3i& point) {
-                    if (kept_.keeps(ownerLevel, point)) found[std::size_t(i)].push_back({ownerLevel, point});
-                });
+                reconstruction_.visitSources(level, p,
+                                             [&](int ownerLevel, const Vec3i& point, bool isCovered) {
+                                                 if (!isCovered && kept_.keeps(ownerLevel, point))
+                                                     found[std::size_t(i)].push_back({ownerLevel, point});
+                                             });
             });
         });
         boxes_.clear();
@@ -270,6 +232,7 @@ class Extender {
     const Reconstruction& reconstruction_;
     const KeptPoints& kept_;
     const Execution& execution_;
+    const ClosedCoverage coverage_;
     std::vector<std::unique_ptr<ClosedBox>> boxes_;  // one a leaf; null where every point is covered
 };
 
@@ -373,7 +336,7 @@ void Extender::markLayers(int layers) {
     parallelFor(execution_, std::int64_t(targets.size()), [&](std::int64_t t) {
         const BrickKey& key = targets[std::size_t(t)];
         const std::int64_t leaf = tree_.findLeaf(key);
-        if (leaf >= 0 && fullyCovered(store_, std::size_t(leaf))) return;
+        if (leaf >= 0 && coverage_.isFull(std::size_t(leaf))) return;
         LayerWindow window(tree_, store_, key, layers);
         window.grow(1);
         const Vec3i first = key.index * b;

@@ -48,6 +48,11 @@ Reconstruction::Owner Reconstruction::findOwner(int level, const Vec3i& p) const
     return {finer, finerLevel, p * (1 << (level - finerLevel)), false};
 }
 
+int Reconstruction::coarserLevelAt(int level, const Vec3i& p) const {
+    const Owner owner = findOwner(level, p);
+    return owner.isInterpolated ? owner.level : -1;
+}
+
 const Tile* Reconstruction::coveredTile(const Owner& owner) const {
     if (owner.leaf < 0) return nullptr;
     const int n = store_->tilesPerEdge();
@@ -103,15 +108,15 @@ PointSource Reconstruction::fromCoarse(int level, const Vec3i& p, int coarse, in
     return source;
 }
 
-void Reconstruction::visitOutside(int level, const Vec3i& p, const VisitOutside& visit) const {
+void Reconstruction::visitSources(int level, const Vec3i& p, const VisitSource& visit) const {
     const Owner owner = findOwner(level, p);
     if (!owner.isInterpolated) {
-        if (!coveredTile(owner)) visit(owner.level, owner.point);
+        visit(owner.level, owner.point, coveredTile(owner) != nullptr);
         return;
     }
     const auto [cell, t] = coarseCell(p, owner.level - level);
     for (int c = 0; c < 8; ++c)
-        if (cornerWeight(t, c) > 0) visitOutside(owner.level, cell + cornerOffset(c), visit);
+        if (cornerWeight(t, c) > 0) visitSources(owner.level, cell + cornerOffset(c), visit);
 }
 
 void Reconstruction::nearestValues(int level, const Vec3i& p, int firstChannel,

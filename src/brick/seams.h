@@ -95,10 +95,12 @@ class Reconstruction {
     bool isCovered(int level, const Vec3i& p) const {
         return resolve(level, p, 0, {}) == PointSource::covered;
     }
-    /// Calls visit(level, p) for every point outside the mesh that the value at `p` depends on, as a point of
-    /// the leaf that owns it, or of the last level looked at when none does.
-    using VisitOutside = std::function<void(int level, const Vec3i& p)>;
-    void visitOutside(int level, const Vec3i& p, const VisitOutside& visit) const;
+    /// The level of the coarser leaf that a point is interpolated in; -1: it isn't.
+    int coarserLevelAt(int level, const Vec3i& p) const;
+    /// Calls visit(level, p, isCovered) for every point that the value at `p` depends on, as a point of the
+    /// leaf that owns it, or of the last level looked at when none does.
+    using VisitSource = std::function<void(int level, const Vec3i& p, bool isCovered)>;
+    void visitSources(int level, const Vec3i& p, const VisitSource& visit) const;
     /// All channels at the mesh point nearest to lattice point `p`; NaN where a value isn't finite as a
     /// float, and for a mesh without elements.
     void nearestValues(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;

@@ -150,6 +150,50 @@ NearestPointIndex::NearestPointIndex(const TetMesh& mesh, int threads) : impl_(s
 
 NearestPointIndex::~NearestPointIndex() = default;
 
+std::vector<double> NearestPointIndex::distances(const PointGrid& grid,
+                                                 std::span<const std::uint32_t> offsets,
+                                                 double reachWorld) const {
+    if (offsets.empty()) return {};
+    constexpr double kUnwanted = -1;
+    const auto row = std::size_t(grid.size.x), plane = row * std::size_t(grid.size.y);
+    std::vector<double> distance2(plane * std::size_t(grid.size.z), kUnwanted);
+    for (const std::uint32_t offset : offsets) distance2[offset] = reachWorld * reachWorld;
+    const auto placeOf = [&](const Vec3i& p) { return grid.originWorld + grid.spacingWorld * Vec3d(p); };
+    const Vec3i last = grid.first + grid.size - 1;
+    impl_->tree.visitOverlaps(
+        {placeOf(grid.first) - reachWorld, placeOf(last) + reachWorld}, [&](std::int64_t at) {
+            const BoundaryTriangle& triangle = impl_->triangles[std::size_t(at)];
+            const Vec3d &a = triangle.corners[0], &b = triangle.corners[1], &c = triangle.corners[2];
+            const Vec3d normal = glm::cross(b - a, c - a);
+            // Further from the triangle's plane than this is out of reach, however it was rounded.
+            const double most = reachWorld * glm::length(normal) * (1 + 1e-6);
+            const auto pointsOf = [&](const Vec3d& place) {
+                return (place - grid.originWorld) / grid.spacingWorld;
+            };
+            const Vec3d low =
+                glm::max(glm::ceil(pointsOf(glm::min(glm::min(a, b), c) - reachWorld)), Vec3d(grid.first));
+            const Vec3d high =
+                glm::min(glm::floor(pointsOf(glm::max(glm::max(a, b), c) + reachWorld)), Vec3d(last));
+            Vec3i p;
+            for (p.z = int(low.z); p.z <= int(high.z); ++p.z)
+                for (p.y = int(low.y); p.y <= int(high.y); ++p.y)
+                    for (p.x = int(low.x); p.x <= int(high.x); ++p.x) {
+                        const Vec3i local = p - grid.first;
+                        double& best = distance2[std::size_t(local.z) * plane + std::size_t(local.y) * row +
+                                                 std::size_t(local.x)];
+                        if (best == kUnwanted) continue;
+                        const Vec3d place = placeOf(p);
+                        if (!(std::abs(glm::dot(place - a, normal)) <= most)) continue;
+                        best = std::min(best, nearestOnTriangle(triangle, place).distance2);
+                    }
+        });
+    std::vector<double> distances;
+    for (const std::uint32_t offset : offsets)
+        distances.push_back(distance2[offset] < reachWorld * reachWorld ? std::sqrt(distance2[offset])
+                                                                        : reachWorld);
+    return distances;
+}
+
 NearestPoint NearestPointIndex::find(const Vec3d& pointWorld, double maxDistanceWorld) const {
     NearestPoint result;
     const BoxTree& tree = impl_->tree;

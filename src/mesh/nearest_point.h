@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "tessera/mesh.h"
 
@@ -27,6 +29,16 @@ class NearestPointIndex {
     ~NearestPointIndex();
     /// @param maxDistanceWorld faces further away need not be found.
     NearestPoint find(const Vec3d& pointWorld, double maxDistanceWorld) const;
+    /// Points originWorld + spacingWorld (i, j, k), (i, j, k) from `first` on.
+    struct PointGrid {
+        Vec3d originWorld{0};
+        double spacingWorld = 1;
+        Vec3i first{0}, size{0};
+    };
+    /// How far points of a grid are from the boundary, in world units: `reachWorld` where that is further.
+    /// @param offsets of the points among all of the grid, x fastest.
+    std::vector<double> distances(const PointGrid& grid, std::span<const std::uint32_t> offsets,
+                                  double reachWorld) const;
 
   private:
     struct Impl;

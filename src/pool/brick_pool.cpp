@@ -164,7 +164,7 @@ void BrickPool::grow(GlContext& context, int layers) const {
     const std::size_t first = isNew ? device_->codes.size() : device_->codes.size() - groups;
     for (std::size_t group = 0; group < groups; ++group) {
         make(codes, coding_.internalFormat(group), isNew ? nullptr : &device_->codes[first + group]);
-        make(coverage, GL_R8, isNew ? nullptr : &device_->coverage[first + group]);
+        make(coverage, GL_RG8, isNew ? nullptr : &device_->coverage[first + group]);
     }
     context.throwIfFailed();
     device_->codes.resize(first);
@@ -304,7 +304,7 @@ void BrickPool::uploadPart(const GlFunctions& gl, std::uint32_t slot, const Slot
         gl.TextureSubImage3D(codes(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z,
                              coding_.pixelFormat(group), coding_.pixelType(),
                              part.texels.codes[group].data());
-        gl.TextureSubImage3D(coverage(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z, GL_RED,
+        gl.TextureSubImage3D(coverage(atlas, group).id(), 0, at.x, at.y, at.z, size.x, size.y, size.z, GL_RG,
                              GL_UNSIGNED_BYTE, part.texels.coverage[group].data());
     }
 }

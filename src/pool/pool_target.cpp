@@ -109,9 +109,9 @@ void PoolTarget::publish(const Publication& publication) {
 void PoolTarget::look(const PointValues& points, BrickInPool& at) const {
     at.channels.resize(std::size_t(bricks_.channels()));
     for (std::size_t p = 0; p < points.covered.size(); ++p) {
-        const bool isCovered = points.covered[p] != 0;
-        at.isCovered = at.isCovered || isCovered;
-        at.isWhole = at.isWhole && isCovered;
+        const bool isCovered = points.covered[p] != 0, isInside = !(points.surface[p] < 0);
+        at.isCovered = at.isCovered || isCovered || isInside;
+        at.isWhole = at.isWhole && isCovered && isInside;
         for (std::size_t c = 0; c < at.channels.size(); ++c) {
             const double value = points.values[p * at.channels.size() + c];
             BrickInPool::Channel& channel = at.channels[c];

@@ -26,8 +26,8 @@ struct PoolCounts {
 struct BrickInPool {
     DepthKey key;
     std::uint32_t slot = 0;
-    bool isCovered = false;  ///< some point of the closed box may be
-    bool isWhole = false;    ///< every point is
+    bool isCovered = false;  ///< some point of the closed box may be, or not be outside the surface
+    bool isWhole = false;    ///< every point is both
     /// Of a channel: the finite values of all points of the closed box, those outside the mesh too, lie
     /// within.
     struct Channel {

@@ -9,6 +9,7 @@
 #include "base/check.h"
 #include "base/floor_div.h"
 #include "base/parallel.h"
+#include "brick/surface_distance.h"
 
 namespace tessera {
 
@@ -58,7 +59,7 @@ class ShownBricks::NearestWalk {
 };
 
 bool operator==(const PointValues& a, const PointValues& b) {
-    return a.covered == b.covered && a.values.size() == b.values.size() &&
+    return a.covered == b.covered && a.surface == b.surface && a.values.size() == b.values.size() &&
            std::memcmp(a.values.data(), b.values.data(), a.values.size() * sizeof(double)) == 0;
 }
 
@@ -90,8 +91,11 @@ void ShownBricks::apply(const Publication& publication, const Execution& executi
     }
     // What can fail from outside is done first, so that nothing has changed then.
     std::vector<Leaf> added(publication.added.size());
-    for (std::size_t i = 0; i < added.size(); ++i)
-        added[i].leaf = publication.added[i].leaf, added[i].samples = publication.added[i].samples;
+    for (std::size_t i = 0; i < added.size(); ++i) {
+        added[i].leaf = publication.added[i].leaf;
+        added[i].samples = publication.added[i].samples;
+        added[i].surface = publication.added[i].surface;
+    }
     parallelFor(execution, std::int64_t(added.size()),
                 [&](std::int64_t i) { findOutside(added[std::size_t(i)]); });
 
@@ -122,14 +126,24 @@ bool ShownBricks::isOnBorder(const Vec3i& local) const {
 void ShownBricks::findOutside(Leaf& leaf) const {
     if (!mesh_) return;
     const Block& samples = *leaf.samples;
+    auto surface = std::make_shared<const SurfacePoints>();
+    if (samples.coverage.end() != std::find(samples.coverage.begin(), samples.coverage.end(), 0))
+        surface = std::make_shared<const SurfacePoints>(
+            measureSurface(nearest_->get(), samples.lattice, samples.box, samples.coverage));
+    auto corner = surface->all().begin();
     std::vector<double> values(channelOf_.size());
     NearestWalk walk(nearest_);
+    std::uint32_t offset = 0;
     forEachPoint(samples.box, [&](const Vec3i& p) {
-        if (samples.covered(p) || !isOnBorder(p - samples.box.min)) return;
+        const bool isAtSurface = corner != surface->all().end() && corner->first == offset;
+        if (isAtSurface) ++corner;
+        const std::uint32_t here = offset++;
+        if (samples.covered(p) || (!isAtSurface && !isOnBorder(p - samples.box.min))) return;
         nearestValues(leaf, p, walk, values);
-        leaf.outside.push_back(std::uint32_t(samples.offset(p)));
+        leaf.outside.push_back(here);
         leaf.outsideValues.insert(leaf.outsideValues.end(), values.begin(), values.end());
     });
+    leaf.surface = std::move(surface);
 }
 
 // At a point outside the mesh, in the closed box of a leaf.
@@ -157,6 +171,16 @@ void ShownBricks::nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& w
     }
 }
 
+// At a point of the closed box of a leaf, in its voxels.
+double ShownBricks::surfaceAt(const Leaf& leaf, const Vec3i& p, PointSource source, Unknown unknown) const {
+    const bool isCovered = source == PointSource::covered;
+    if (!leaf.surface) return isCovered ? 0.5 : -0.5;
+    if (const float* known = leaf.surface->find(leaf.samples->offset(p))) return double(*known);
+    if (!mesh_ || unknown == Unknown::far) return isCovered ? kFarFromSurface : -kFarFromSurface;
+    const double distance = distanceFromSurface(nearest_->get(), leaf.samples->lattice, p);
+    return isCovered ? distance : -distance;
+}
+
 const ShownBricks::Leaf* ShownBricks::findCovering(const DepthKey& key) const {
     const auto found = index_.findCovering(key);
     return found ? &leaves_[found->number] : nullptr;
@@ -174,8 +198,8 @@ PointSource ShownBricks::ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk
 
 // `asking` is a leaf of this depth whose closed box holds p. `near` gives the leaf that covers a brick.
 template <class Near>
-PointSource ShownBricks::resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near,
-                                 NearestWalk& walk, std::span<double> values) const {
+ShownBricks::Point ShownBricks::resolve(Depth depth, const Vec3i& p, const Leaf& asking, Unknown unknown,
+                                        Near&& near, NearestWalk& walk, std::span<double> values) const {
     const Vec3i brick = floorDiv(p, cells_);
     const Vec3i rest = p - brick * cells_;
     // The bricks of this depth whose closed boxes hold p: the owner, and on each axis where p lies on a
@@ -189,25 +213,34 @@ PointSource ShownBricks::resolve(Depth depth, const Vec3i& p, const Leaf& asking
         if (side == 0) own = leaf;
         if (leaf && leaf->leaf.key.depth < coarsest->leaf.key.depth) coarsest = leaf;
     }
-    if (coarsest != &asking) return fromCoarse(depth, p, *coarsest, walk, values);
-    if (own) return ownSample(*own, p, walk, values);
-    if (const auto finer = index_.findOwner(depth, p, cells_)) {
+    if (coarsest != &asking) return fromCoarse(depth, p, *coarsest, unknown, walk, values);
+    PointSource source = PointSource::nearest;
+    if (own) {
+        source = ownSample(*own, p, walk, values);
+    } else if (const auto finer = index_.findOwner(depth, p, cells_)) {
         const int times = 1 << (finer->key.depth - depth);
-        return ownSample(leaves_[finer->number], p * times, walk, values);
+        source = ownSample(leaves_[finer->number], p * times, walk, values);
+    } else {
+        nearestValues(asking, p, walk, values);
     }
-    nearestValues(asking, p, walk, values);
-    return PointSource::nearest;
+    return {source, surfaceAt(asking, p, source, unknown)};
 }
 
-PointSource ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, NearestWalk& walk,
-                                    std::span<double> values) const {
+ShownBricks::Point ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, Unknown unknown,
+                                           NearestWalk& walk, std::span<double> values) const {
     const Depth above = coarse.leaf.key.depth;
     const int step = 1 << (depth - above);
     const Vec3i cell = floorDiv(p, step);
     const Vec3d t = Vec3d(p - cell * step) / double(step);
     const auto near = [&](const DepthKey& key) { return findCovering(key); };
-    if (t == Vec3d(0)) return resolve(above, cell, coarse, near, walk, values);
-    PointSource source = PointSource::covered;
+    const auto shown = [&](double surface) {
+        return std::clamp(surface * step, -kFarFromSurface, kFarFromSurface);
+    };
+    if (t == Vec3d(0)) {
+        const Point at = resolve(above, cell, coarse, unknown, near, walk, values);
+        return {at.source, shown(at.surface)};
+    }
+    Point result;
     std::array<double, 16> few;
     std::vector<double> many;
     if (values.size() > few.size()) many.resize(values.size());
@@ -216,10 +249,13 @@ PointSource ShownBricks::fromCoarse(Depth depth, const Vec3i& p, const Leaf& coa
     for (int c = 0; c < 8; ++c) {
         const double weight = cornerWeight(t, c);
         if (weight == 0) continue;
-        source = std::min(source, resolve(above, cell + cornerOffset(c), coarse, near, walk, corner));
+        const Point at = resolve(above, cell + cornerOffset(c), coarse, unknown, near, walk, corner);
+        result.source = std::min(result.source, at.source);
+        result.surface += weight * at.surface;
         for (std::size_t v = 0; v < values.size(); ++v) values[v] += weight * corner[v];
     }
-    return source;
+    result.surface = shown(result.surface);
+    return result;
 }
 
 PointValues ShownBricks::valuesAt(const GrowingLeaf& asked, const IndexBox& points) const {
@@ -239,14 +275,22 @@ PointValues ShownBricks::valuesAt(const GrowingLeaf& asked, const IndexBox& poin
     const auto channels = std::size_t(channels_);
     result.values.resize(std::size_t(points.count()) * channels);
     result.covered.resize(std::size_t(points.count()));
+    result.surface.resize(std::size_t(points.count()));
     std::size_t n = 0;
     forEachPoint(points, [&](const Vec3i& p) {
         const std::span<double> values(result.values.data() + n * channels, channels);
-        const bool isInside = !isOnBorder(p - leaf.samples->box.min);
-        const PointSource source =
-            isInside ? ownSample(leaf, p, walk, values) : resolve(key.depth, p, leaf, near, walk, values);
+        Point at;
+        if (isOnBorder(p - leaf.samples->box.min)) {
+            const bool isAtSurface = leaf.surface && leaf.surface->find(leaf.samples->offset(p));
+            at = resolve(key.depth, p, leaf, isAtSurface ? Unknown::measured : Unknown::far, near, walk,
+                         values);
+        } else {
+            at.source = ownSample(leaf, p, walk, values);
+            at.surface = surfaceAt(leaf, p, at.source, Unknown::far);
+        }
         // Beside the surface a coarser neighbour's corners may lie outside where the point itself doesn't.
-        result.covered[n++] = source == PointSource::covered || leaf.samples->covered(p);
+        result.covered[n] = at.source == PointSource::covered || leaf.samples->covered(p);
+        result.surface[n++] = float(at.surface);
     });
     return result;
 }

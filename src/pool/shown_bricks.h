@@ -15,10 +15,13 @@
 namespace tessera {
 
 /// The values of some points, point by point: channels() each. Beside each point whether it is covered: a
-/// sample there is, or the seam rule interpolates between samples that are.
+/// sample there is, or the seam rule interpolates between samples that are. And how far it is from the mesh's
+/// surface, by the seam rule as values are: at cells that the surface runs through a signed distance
+/// (SurfacePoints), elsewhere as far as there is.
 struct PointValues {
     std::vector<double> values;  ///< NaN where a value isn't finite
     std::vector<std::uint8_t> covered;
+    std::vector<float> surface;  ///< voxels of the leaf, not below 0 in the mesh
     friend bool operator==(const PointValues& a, const PointValues& b);  ///< bit for bit
 };
 
@@ -33,7 +36,8 @@ class ShownBricks {
     ShownBricks(const TetMesh& mesh, std::span<const int> fields, int brickCells,
                 const NearestOnDemand& nearest);
 
-    /// Without a mesh: the samples have values outside it too, as those of showStored() do.
+    /// Without a mesh: the samples have values outside it too, and distances where they are known, as those
+    /// of showStored() do.
     ShownBricks(int channels, int brickCells);
 
     /// Takes leaves away and adds others. Throws InternalError when a leaf to remove doesn't stand.
@@ -58,19 +62,31 @@ class ShownBricks {
   private:
     struct Leaf {
         GrowingLeaf leaf;
-        std::shared_ptr<const Block> samples;  ///< null: no leaf has this number
-        /// Values of points on the brick's border that are outside the mesh: their offsets in the closed box,
-        /// ascending, and their channels.
+        std::shared_ptr<const Block> samples;          ///< null: no leaf has this number
+        std::shared_ptr<const SurfacePoints> surface;  ///< null: none is known
+        /// Values of points on the brick's border or at the surface that are outside the mesh: their offsets
+        /// in the closed box, ascending, and their channels.
         std::vector<std::uint32_t> outside;
         std::vector<double> outsideValues;
     };
     class NearestWalk;
+    /// What is at a point.
+    struct Point {
+        PointSource source = PointSource::covered;
+        double surface = 0;  ///< voxels of the depth asked for
+    };
+    /// Of a point whose distance isn't known.
+    enum class Unknown {
+        far,       ///< no cell that it is a corner of meets the surface
+        measured,  ///< where there is a mesh
+    };
 
     template <class Near>
-    PointSource resolve(Depth depth, const Vec3i& p, const Leaf& asking, Near&& near, NearestWalk& walk,
-                        std::span<double> values) const;
-    PointSource fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, NearestWalk& walk,
-                           std::span<double> values) const;
+    Point resolve(Depth depth, const Vec3i& p, const Leaf& asking, Unknown unknown, Near&& near,
+                  NearestWalk& walk, std::span<double> values) const;
+    Point fromCoarse(Depth depth, const Vec3i& p, const Leaf& coarse, Unknown unknown, NearestWalk& walk,
+                     std::span<double> values) const;
+    double surfaceAt(const Leaf& leaf, const Vec3i& p, PointSource source, Unknown unknown) const;
     PointSource ownSample(const Leaf& leaf, const Vec3i& p, NearestWalk& walk,
                           std::span<double> values) const;
     void nearestValues(const Leaf& leaf, const Vec3i& p, NearestWalk& walk, std::span<double> values) const;

@@ -37,6 +37,29 @@ class StoredReader {
                 }
         return block;
     }
+    /// Null where none is known.
+    std::shared_ptr<const SurfacePoints> readSurface(std::size_t leaf) const {
+        if (store_.surface().empty()) return nullptr;
+        const BrickKey& key = tree_.leaves()[leaf];
+        const IndexBox box = tree_.closedPoints(key);
+        auto surface = std::make_shared<SurfacePoints>();
+        std::uint32_t offset = 0;
+        const Tile* tile = nullptr;
+        Vec3i p, last(std::numeric_limits<int>::min());
+        for (p.z = box.min.z; p.z < box.max.z; ++p.z)
+            for (p.y = box.min.y; p.y < box.max.y; ++p.y)
+                for (p.x = box.min.x; p.x < box.max.x; ++p.x, ++offset) {
+                    const Vec3i at = floorDiv(p, kTileSize);
+                    if (at != last) {
+                        const auto found = store_.surface().find({key.level, at});
+                        tile = found == store_.surface().end() ? nullptr : &found->second;
+                        last = at;
+                    }
+                    if (tile && tile->covered(offsetInTile(p)))
+                        surface->add(offset, double(tile->channel(0)[offsetInTile(p)]));
+                }
+        return surface;
+    }
     std::int64_t estimated() const { return estimated_; }
     std::int64_t missing() const { return missing_; }
 
@@ -102,8 +125,8 @@ class StoredReader {
 void addNotes(const StoredTraits& traits, StoredBricks& stored) {
     if (traits.layers == 0 && stored.estimatedPoints + stored.missingPoints > 0)
         stored.notes.push_back(
-            "the file has no values outside the mesh (--extend 1 stores them), so the field is approximate "
-            "within a voxel of the mesh's surface: " +
+            "the file has no values outside the mesh nor its surface (--extend 1 stores them), so both are "
+            "approximate within a voxel of it: " +
             std::to_string(stored.estimatedPoints) +
             " points take the mean of the samples next to them, and " + std::to_string(stored.missingPoints) +
             " have no value");
@@ -131,7 +154,8 @@ StoredBricks showStored(const BrickTree& tree, const BrickStore& store, const St
         const auto leaf = std::size_t(i);
         const BrickKey& key = tree.leaves()[leaf];
         const Depth depth(tree.levelCount() - 1 - key.level);
-        stored.bricks[leaf] = {{{depth, key.index}, std::uint32_t(leaf)}, reader.read(leaf)};
+        stored.bricks[leaf] = {
+            {{depth, key.index}, std::uint32_t(leaf)}, reader.read(leaf), reader.readSurface(leaf)};
     });
     stored.estimatedPoints = reader.estimated();
     stored.missingPoints = reader.missing();

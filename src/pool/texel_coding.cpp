@@ -7,10 +7,13 @@
 #include <utility>
 
 #include "base/check.h"
+#include "brick/surface_distance.h"
 
 namespace tessera {
 
 namespace {
+
+constexpr std::int64_t kCoverageBytes = 2;
 
 std::size_t componentBytes(SampleFormat format) {
     switch (format) {
@@ -31,6 +34,11 @@ unsigned stepOf(float code, double most) {
 }
 
 }  // namespace
+
+std::uint8_t surfaceCode(float voxels) {
+    const int steps = int(std::lround(std::clamp(double(voxels) / kFarFromSurface, -1.0, 1.0) * 127));
+    return std::uint8_t(128 + (voxels < 0 ? std::min(steps, -1) : steps));
+}
 
 std::uint16_t halfFromFloat(float value) {
     const auto bits = std::bit_cast<std::uint32_t>(value);
@@ -92,7 +100,7 @@ std::int64_t TexelCoding::texelBytes(std::size_t group) const {
 
 std::int64_t TexelCoding::pointBytes() const {
     std::int64_t bytes = 0;
-    for (std::size_t group = 0; group < groupCount(); ++group) bytes += texelBytes(group) + 1;
+    for (std::size_t group = 0; group < groupCount(); ++group) bytes += texelBytes(group) + kCoverageBytes;
     return bytes;
 }
 
@@ -116,7 +124,7 @@ Texels TexelCoding::encode(const PointValues& points) const {
         const auto bytes = std::size_t(texelBytes(group));
         const int first = int(group) * kChannelsAGroup;
         std::vector<std::uint8_t>& codes = texels.codes.emplace_back(count * bytes, std::uint8_t(0));
-        std::vector<std::uint8_t>& coverage = texels.coverage.emplace_back(count, std::uint8_t(0));
+        std::vector<std::uint8_t>& coverage = texels.coverage.emplace_back(count * kCoverageBytes);
         for (std::size_t i = 0; i < count; ++i) {
             int invalid = 0;
             for (int c = 0; c < channelsOf(group); ++c) {
@@ -126,7 +134,8 @@ Texels TexelCoding::encode(const PointValues& points) const {
                 else
                     invalid |= 1 << c;
             }
-            if (points.covered[i]) coverage[i] = std::uint8_t(1 + invalid);
+            coverage[i * kCoverageBytes] = std::uint8_t(points.covered[i] ? 1 + invalid : 0);
+            coverage[i * kCoverageBytes + 1] = surfaceCode(points.surface[i]);
         }
     }
     return texels;

@@ -58,7 +58,7 @@ RayCaster::RayCaster(const BrickTree& tree, const Reconstruction& reconstruction
                 for (int x = box.min.x; x < box.max.x; ++x) {
                     const SeamValue at = reconstruction.at(key.level, {x, y, z}, channel);
                     brick.values.push_back(float(at.value));
-                    brick.covered.push_back(at.covered);
+                    brick.surface.push_back(at.covered ? 0.5f : -0.5f);
                 }
         findRange(brick);
     });
@@ -132,10 +132,10 @@ class RayCaster::Ray {
         const Brick& brick = caster_.bricks_[leaf];
         const auto localAt = [&](double at) { return (eye_ + at * direction_) * voxels - first; };
         const auto coverAt = [&](double at) {
-            return way_.isOutlinedBySamples ? coverageAt(brick, localAt(at)) - 0.5 : 0.5;
+            return way_.isOutlinedBySamples ? surfaceAt(brick, localAt(at)) : 0.5;
         };
         double cover = coverAt(begin);
-        // Of a step that the surface runs through the part in the mesh counts, coverage taken as linear.
+        // Of a step that the surface runs through the part in the mesh counts, the distance taken as linear.
         const auto step = [&](double from, double to) {
             const double coverNext = coverAt(to);
             const double crossing = from + std::clamp(cover / (cover - coverNext), 0.0, 1.0) * (to - from);
@@ -172,8 +172,8 @@ class RayCaster::Ray {
         };
         return glm::mix(glm::mix(row(0), row(n), t.y), glm::mix(row(n * n), row(n * n + n), t.y), t.z);
     }
-    double coverageAt(const Brick& brick, const Vec3d& local) const {
-        return interpolate(local, [&](std::size_t p) { return brick.covered[p] ? 1.0 : 0.0; });
+    double surfaceAt(const Brick& brick, const Vec3d& local) const {
+        return interpolate(local, [&](std::size_t p) { return brick.surface[p]; });
     }
     double valueAt(const Brick& brick, const Vec3d& local) const {
         return interpolate(local, [&](std::size_t p) { return brick.values[p]; });

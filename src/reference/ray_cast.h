@@ -39,7 +39,7 @@ struct RayCastOptions {
 /// What is at the points of a brick's closed box, x the fastest.
 struct BrickPoints {
     std::vector<float> values;
-    std::vector<std::uint8_t> covered;  ///< 0 outside the mesh
+    std::vector<float> surface;  ///< below 0 outside the mesh
 };
 
 /// Draws one channel of a reconstruction: along each ray, from the front to the back, a step of length s in
@@ -59,8 +59,8 @@ class RayCaster {
     /// Throws InputError for a transfer function that isn't one and options out of range.
     RgbaImage draw(const MeshRays& rays, const TransferFunction& function, const RayCastOptions& options,
                    const Execution& execution) const;
-    /// Without a mesh: what lies in all of `within`, where the points' coverage, interpolated, is at least a
-    /// half.
+    /// Without a mesh: what lies in all of `within`, where the points' `surface`, interpolated, isn't below
+    /// 0.
     RgbaImage draw(const Camera& camera, std::span<const HalfSpace> within, const TransferFunction& function,
                    const RayCastOptions& options, const Execution& execution) const;
 

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "brick/growing_tree.h"
+#include "brick/surface_distance.h"
 #include "tessera/lattice.h"
 
 namespace tessera {
@@ -15,6 +16,8 @@ namespace tessera {
 struct ShownBrick {
     GrowingLeaf leaf;
     std::shared_ptr<const Block> samples;
+    /// Null unless the bricks are from a file, where no mesh is at hand.
+    std::shared_ptr<const SurfacePoints> surface = {};
 };
 
 /// A step from one consistent state of a scheduler to the next: leaves that cover the domain once, of which

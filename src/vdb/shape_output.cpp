@@ -9,6 +9,7 @@
 #include "base/text.h"
 #include "brick/extend.h"
 #include "brick/flatten.h"
+#include "brick/surface_distance.h"
 #include "refine/brick_result.h"
 #include "refine/measure_error.h"
 #include "tessera/lattice.h"
@@ -105,6 +106,7 @@ void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::v
                 reconstruction.nearestValues(level, p, 0, values);
             },
             execution);
+        measureSurface(result.tree, result.store, reconstruction, nearest.get(), kept, execution);
     }
     bool isRounded = false;
     if (shape.halfFloat) {

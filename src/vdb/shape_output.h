@@ -37,9 +37,9 @@ struct FlatGridPlan {
 };
 FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const OutputShape& shape);
 
-/// Makes of a run's samples what the file will hold: one grid for the flat layout, the extension, rounded
-/// values. Then measures that, so that the report is the file's; `samplesReport` keeps the samples' own when
-/// the file is coarser or less precise.
+/// Makes of a run's samples what the file will hold: one grid for the flat layout, the extension and in the
+/// levels layout the surface with it, rounded values. Then measures that, so that the report is the file's;
+/// `samplesReport` keeps the samples' own when the file is coarser or less precise.
 /// @param outputs one for every field: the grids' names. @param resampler what the samples were made by.
 void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::vector<OutputField>& outputs,
                   const Resampler& resampler, const BindOptions& bind, const OutputShape& shape,

@@ -195,7 +195,7 @@ std::string gridName(const std::string& base, VdbLayout layout, int level) {
 }
 
 void checkOutputFields(const std::vector<OutputField>& fields) {
-    std::set<std::string> names{"coverage"};
+    std::set<std::string> names{"coverage", "surface"};
     for (const GridPlan& grid : planGrids(fields)) {
         if (grid.name.empty())
             throw InputError("a grid needs a name: give the field another with --field name=newname");

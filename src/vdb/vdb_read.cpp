@@ -21,6 +21,8 @@
 
 #include "base/floor_div.h"
 #include "base/sanitizers.h"
+#include "base/text.h"
+#include "brick/surface_distance.h"
 #include "files/file_digest.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
@@ -283,6 +285,28 @@ void checkBackground(double found, const openvdb::GridBase& grid, VdbFile& file)
         file.gridProblems.push_back("grid " + grid.getName() + " has another background than the file says");
 }
 
+void readSurface(openvdb::io::File& source, int level, VdbFile& file) {
+    const std::string name = gridName("surface", file.layout, level);
+    if (!source.hasGrid(name)) return;
+    const auto grid = readTypedGrid<openvdb::FloatGrid>(source, name);
+    checkFrame(*grid, level, file);
+    const double voxel = file.tree.spacingWorld(level) * file.unitScale;
+    for (auto node = grid->tree().cbeginLeaf(); node; ++node) {
+        const openvdb::Coord& o = node->origin();
+        Tile& tile = file.store.surface()[{level, floorDiv(Vec3i(o.x(), o.y(), o.z()), kTileSize)}];
+        tile.coverage = activeWords(*node);
+        tile.values = std::make_unique<float[]>(kTilePoints);
+        for (int i = 0; i < kTilePoints; ++i) {
+            if (!tile.covered(i)) continue;
+            const double distance = -double(node->getValue(openvdb::Index(i))) / voxel;
+            if (!(std::abs(distance) <= kFarFromSurface * (1 + 1e-6)))
+                throw InputError("grid " + name + " has a distance of more than " +
+                                 exactText(kFarFromSurface) + " voxels");
+            tile.values[std::size_t(i)] = float(distance);
+        }
+    }
+}
+
 void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
     const auto coverage = readTypedGrid<openvdb::BoolGrid>(source, gridName("coverage", file.layout, level));
     checkFrame(*coverage, level, file);
@@ -314,6 +338,7 @@ void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
             readExtension(*grid, level, file, put);
         }
     }
+    readSurface(source, level, file);
 }
 
 // Adds the bricks that hold an active point of a grid.

@@ -14,6 +14,7 @@
 #include "base/floor_div.h"
 #include "base/parallel.h"
 #include "base/text.h"
+#include "brick/surface_distance.h"
 #include "files/atomic_file.h"
 #include "files/file_digest.h"
 #include "refine/brick_result.h"
@@ -65,11 +66,12 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
     return math::Transform::Ptr(new math::Transform(math::MapBase::Ptr(new math::AffineMap(matrix))));
 }
 
-// 8^3 points of a grid: samples, or points outside the mesh that carry a value, or both.
+// 8^3 points of a grid: samples, points outside the mesh that carry a value, distances from the surface.
 struct GridTile {
     Vec3i origin{0};
     const Tile* samples = nullptr;
     const Tile* extension = nullptr;
+    const Tile* surface = nullptr;
 };
 
 // Bits of a tile where all given channels are finite.
@@ -122,8 +124,8 @@ class BuilderOf : public GridBuilder {
     void reserve(std::size_t tiles) override { made_.resize(tiles); }
     void makeLeaf(std::size_t position, const GridTile& tile) override {
         Leaf leaf(coord(tile.origin), grid_->background());
-        if (tile.samples) fill(leaf, *tile.samples);
-        if (tile.extension && isExtended()) fill(leaf, *tile.extension);
+        for (const Tile* part : partsOf(tile))
+            if (part) fill(leaf, *part);
         if (leaf.isEmpty()) return;
         if (form_ == LeafForm::plain) {
             made_[position] = {std::make_unique<Leaf>(leaf), PackedLeaf()};
@@ -147,7 +149,10 @@ class BuilderOf : public GridBuilder {
 
   protected:
     virtual void fill(Leaf& leaf, const Tile& tile) const = 0;
-    virtual bool isExtended() const { return true; }
+    /// Null: none.
+    virtual std::array<const Tile*, 2> partsOf(const GridTile& tile) const {
+        return {tile.samples, tile.extension};
+    }
 
   private:
     LeafForm form_;
@@ -202,17 +207,38 @@ class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
         setMask(leaf, tile.coverage);
         leaf.buffer() = BoolLeaf::Buffer(leaf.getValueMask());
     }
-    bool isExtended() const override { return false; }
+    std::array<const Tile*, 2> partsOf(const GridTile& tile) const override {
+        return {tile.samples, nullptr};
+    }
+};
+
+class SurfaceBuilder final : public BuilderOf<openvdb::FloatGrid> {
+  public:
+    explicit SurfaceBuilder(LeafForm form, double voxel)
+        : BuilderOf(form, float(kFarFromSurface * voxel), false), voxel_(voxel) {}
+
+  private:
+    void fill(FloatLeaf& leaf, const Tile& tile) const override {
+        float* values = leaf.buffer().data();
+        for (int i = 0; i < kTilePoints; ++i)
+            if (tile.covered(i)) values[i] = float(-voxel_ * double(tile.channel(0)[i]));
+        setMask(leaf, tile.coverage);
+    }
+    std::array<const Tile*, 2> partsOf(const GridTile& tile) const override {
+        return {tile.surface, nullptr};
+    }
+
+    double voxel_;  // in the file's unit
 };
 
 // All grids of one level.
 struct LevelGrids {
     int level = 0;
-    std::vector<std::unique_ptr<GridBuilder>> builders;  // one a plan, then the coverage
+    std::vector<std::unique_ptr<GridBuilder>> builders;  // one a plan, the coverage, and the surface
 };
 
 LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf, LeafForm form,
-                        int level, const VdbWriteOptions& options) {
+                        int level, const VdbWriteOptions& options, double surfaceVoxel) {
     LevelGrids grids;
     grids.level = level;
     for (std::size_t p = 0; p < plans.size(); ++p) {
@@ -225,6 +251,7 @@ LevelGrids makeBuilders(const std::vector<GridPlan>& plans, const std::vector<bo
         }
     }
     grids.builders.push_back(std::make_unique<CoverageBuilder>(form));
+    if (surfaceVoxel > 0) grids.builders.push_back(std::make_unique<SurfaceBuilder>(form, surfaceVoxel));
     return grids;
 }
 
@@ -238,6 +265,11 @@ void addTiles(LevelGrids& grids, std::span<const GridTile> tiles, const Executio
     });
     parallelFor(execution, std::int64_t(grids.builders.size()),
                 [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
+}
+
+const Tile* partAt(const TileMap& tiles, const TileKey& key) {
+    const auto found = tiles.find(key);
+    return found == tiles.end() ? nullptr : &found->second;
 }
 
 // The tiles of one level in batches; frees them on the way.
@@ -258,12 +290,12 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
             const Tile* tile = store.tile(leaf, t);
             if (!tile) continue;
             const Vec3i origin = first + Vec3i(t / (n * n), t / n % n, t % n) * kTileSize;
-            const auto extended = store.extension().find({level, floorDiv(origin, kTileSize)});
+            const TileKey key{level, floorDiv(origin, kTileSize)};
             places.push_back(
-                {leaf, t, {origin, tile, extended == store.extension().end() ? nullptr : &extended->second}});
+                {leaf, t, {origin, tile, partAt(store.extension(), key), partAt(store.surface(), key)}});
         }
     }
-    // Tiles of the extension alone.
+    // Tiles without samples.
     const auto hasSamples = [&](const Vec3i& tile) {
         const Vec3i brick = floorDiv(tile, n), local = tile - brick * n;
         const std::int64_t leaf = tree.findLeaf({level, brick});
@@ -272,7 +304,10 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
     const std::size_t withSamples = places.size();
     for (const auto& [key, tile] : store.extension())
         if (key.level == level && !hasSamples(key.index))
-            places.push_back({0, -1, {key.index * kTileSize, nullptr, &tile}});
+            places.push_back({0, -1, {key.index * kTileSize, nullptr, &tile, partAt(store.surface(), key)}});
+    for (const auto& [key, tile] : store.surface())
+        if (key.level == level && !hasSamples(key.index) && !partAt(store.extension(), key))
+            places.push_back({0, -1, {key.index * kTileSize, nullptr, nullptr, &tile}});
     std::sort(places.begin() + std::ptrdiff_t(withSamples), places.end(), [](const Place& a, const Place& b) {
         const Vec3i &p = a.grid.origin, &q = b.grid.origin;
         return std::tie(p.z, p.y, p.x) < std::tie(q.z, q.y, q.x);
@@ -290,17 +325,20 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
 
 std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf,
                                    LeafForm form, BrickResult& result, const VdbWriteOptions& options,
-                                   const Execution& execution) {
+                                   double unitScale, const Execution& execution) {
+    const bool hasSurface = !result.store.surface().empty();
     std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
     for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
     for (const auto& [key, tile] : result.store.extension()) present.at(std::size_t(key.level)) = true;
+    for (const auto& [key, tile] : result.store.surface()) present.at(std::size_t(key.level)) = true;
     std::vector<LevelGrids> all;
     for (int level = 0; level < result.tree.levelCount(); ++level) {
         if (!present[std::size_t(level)]) continue;
-        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, form, level, options));
+        const double voxel = hasSurface ? result.tree.spacingWorld(level) * unitScale : 0;
+        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, form, level, options, voxel));
         addLevel(grids, level, result.tree, result.store, execution);
     }
-    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, form, 0, options));
+    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, form, 0, options, 0));
     return all;
 }
 
@@ -351,26 +389,25 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
     grid.insertMeta("tessera_unit_scale", openvdb::StringMetadata(exactText(unitScale)));
 }
 
-// Grids in the order of the file: field by field, each with its finest level first, then the coverage.
-// `flatLevel` is what the level is called of the bricks that a flat grid was made of.
+// Grids in the order of the file: field by field, each with its finest level first, the coverage, the
+// surface. `flatLevel` is what the level is called of the bricks that a flat grid was made of.
 openvdb::GridPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
                                 const BrickTree& tree, const VdbWriteOptions& options, double unitScale,
                                 int flatLevel) {
     openvdb::GridPtrVec ordered;
-    for (std::size_t p = 0; p <= plans.size(); ++p) {
-        const bool coverage = p == plans.size();
+    for (std::size_t p = 0; p < levels.front().builders.size(); ++p) {
+        const bool isField = p < plans.size();
         for (const LevelGrids& grids : levels) {
             openvdb::GridBase& grid = *grids.builders[p]->grid();
-            const std::string base = coverage ? "coverage" : plans[p].name;
+            const std::string base = isField ? plans[p].name : p == plans.size() ? "coverage" : "surface";
             describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
                          options);
             grid.insertMeta("tessera_level", openvdb::Int32Metadata(grids.level + flatLevel));
-            grid.insertMeta("tessera_field", openvdb::StringMetadata(coverage ? "" : plans[p].field));
-            if (!coverage)
+            grid.insertMeta("tessera_field", openvdb::StringMetadata(isField ? plans[p].field : ""));
+            if (isField)
                 grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME
                                                            : openvdb::GRID_UNKNOWN);
-            if (!coverage && plans[p].components == 3)
-                grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+            if (isField && plans[p].components == 3) grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
             grids.builders[p]->describe();
             ordered.push_back(grids.builders[p]->grid());
         }
@@ -514,7 +551,8 @@ openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm f
         TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
                       "a field's channels are in the store");
     const std::vector<bool> toHalf = choosePrecision(fields, result.store, options, written);
-    const std::vector<LevelGrids> levels = buildGrids(plans, toHalf, form, result, options, execution);
+    const std::vector<LevelGrids> levels =
+        buildGrids(plans, toHalf, form, result, options, written.unitScale, execution);
     return finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
 }
 

@@ -12,6 +12,7 @@
 #include "brick/extend.h"
 #include "brick/flatten.h"
 #include "brick/kept_points.h"
+#include "brick/surface_distance.h"
 #include "mesh/field_range.h"
 #include "tessera/lattice.h"
 
@@ -158,6 +159,31 @@ class VoxelChecker {
             execution_);
         compareTiles(store_.extension(), found);
         store_.extension() = std::move(found);
+        compareSurface(reconstruction);
+    }
+
+    // Files with an extension need have no distances.
+    void compareSurface(const Reconstruction& reconstruction) {
+        if (store_.surface().empty()) return;
+        TileMap found = std::move(store_.surface());
+        measureSurface(tree_, store_, reconstruction, nearest_.get(), kept_, execution_);
+        comparePoints(
+            store_.surface(), found,
+            [&](int level, const Vec3i& p, const Tile& expected, const Tile& other, int offset) {
+                ++result_.derived;
+                constexpr double kRounding = 1e-5;  // of places and distances as floats, in voxels
+                if (!(std::abs(double(expected.channel(0)[offset]) - double(other.channel(0)[offset])) <=
+                      kRounding * kFarFromSurface))
+                    note(result_.wrongDerived, level, p, "is at another distance from the mesh's surface");
+            },
+            [&](int level, const Vec3i& p, const Tile&, int) {
+                note(result_.missingDerived, level, p, "has no distance from the mesh's surface");
+            },
+            [&](int level, const Vec3i& p) {
+                note(result_.unexpected, level, p,
+                     "has a distance from the mesh's surface and isn't near it");
+            });
+        store_.surface() = std::move(found);
     }
 
     void compareFlat() {
@@ -312,24 +338,39 @@ class VoxelChecker {
     }
 
     void compareTiles(const TileMap& expected, const TileMap& found) {
+        comparePoints(
+            expected, found,
+            [&](int level, const Vec3i& p, const Tile& tile, const Tile& other, int offset) {
+                compareAt(level, p, tile, other, offset);
+            },
+            [&](int level, const Vec3i& p, const Tile& tile, int offset) {
+                if (isActive(tile, offset))
+                    note(result_.missingDerived, level, p, "has no value, though the mesh needs one there");
+            },
+            [&](int level, const Vec3i& p) {
+                note(result_.unexpected, level, p,
+                     "is active and neither in the mesh nor part of its extension");
+            });
+    }
+    template <class Both, class Missing, class Unexpected>
+    static void comparePoints(const TileMap& expected, const TileMap& found, const Both& both,
+                              const Missing& missing, const Unexpected& unexpected) {
         for (const auto& [key, tile] : expected) {
             const auto other = found.find(key);
             for (int offset = 0; offset < kTilePoints; ++offset) {
                 if (!tile.covered(offset)) continue;
                 const Vec3i p = key.index * kTileSize + pointInTile(offset);
                 if (other != found.end() && other->second.covered(offset))
-                    compareAt(key.level, p, tile, other->second, offset);
-                else if (isActive(tile, offset))
-                    note(result_.missingDerived, key.level, p,
-                         "has no value, though the mesh needs one there");
+                    both(key.level, p, tile, other->second, offset);
+                else
+                    missing(key.level, p, tile, offset);
             }
         }
         for (const auto& [key, tile] : found) {
             const auto other = expected.find(key);
             for (int offset = 0; offset < kTilePoints; ++offset)
                 if (tile.covered(offset) && (other == expected.end() || !other->second.covered(offset)))
-                    note(result_.unexpected, key.level, key.index * kTileSize + pointInTile(offset),
-                         "is active and neither in the mesh nor part of its extension");
+                    unexpected(key.level, key.index * kTileSize + pointInTile(offset));
         }
     }
     /// Whether any grid has a finite value there.

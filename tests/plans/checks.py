@@ -87,6 +87,7 @@ class Checker:
         for level in self.file.levels():
             self.coverage(level)
             self.values(level)
+            self.surface(level)
         self.report()
         PlaceChecker(self.mesh, self.samples, self.file, self.oracle, self.kept, self.findings).run(rng)
         return self.findings
@@ -96,6 +97,9 @@ class Checker:
         file, out = self.file, self.findings
         expected = {file.grid_name(name, level) for f in file.fields for name in f["grids"] for level in file.levels()}
         expected |= {file.grid_name("coverage", level) for level in file.levels()}
+        if file.layout == "levels" and file.extend:
+            has_surface = any(file.grid("surface", level) is not None for level in file.levels())
+            expected |= {file.grid_name("surface", level) for level in file.levels() if has_surface}
         if expected != set(file.grids):
             out.problem("grids", f"expected {sorted(expected)}, the file has {sorted(file.grids)}")
         for grid in file.grids.values():
@@ -202,9 +206,41 @@ class Checker:
             self.compare(grid, component, points[rows], grid.values[found[rows], component], expected.low[rows, channel],
                          expected.high[rows, channel], covered[rows])  # fmt: skip
 
+    def surface(self, level):
+        """How far from the boundary of the mesh points are, below 0 in the mesh: those of cells that it runs through."""
+        out, file = self.findings, self.file
+        grid, coverage = (file.grid(name, level) for name in ("surface", "coverage"))
+        if coverage is None or not file.extend or file.layout != "levels":
+            return
+        # Pairs of points next to each other in a brick, one in the mesh and one outside.
+        for axis in range(3):
+            beside = coverage.points + numpy.eye(3, dtype=numpy.int64)[axis]
+            # On - faces they may be interpolated from a coarser brick.
+            is_inside = ((beside % file.tree.cells) * (coverage.points % file.tree.cells) > 0).all(axis=1)
+            crossed = is_inside & (coverage.find(beside) < 0) & self.kept.keeps(level, coverage.points) & self.kept.keeps(level, beside)
+            for points in (coverage.points[crossed], beside[crossed]):
+                missing = points if grid is None else points[grid.find(points) < 0]
+                if len(missing):
+                    out.problem("surface", f"level {level} has no distance from the surface at {some(missing)}")
+        if grid is None or not len(grid.points):
+            return
+        voxels = grid.values[:, 0] / (file.tree.level_spacing(level) * file.unit_scale)
+        distance, _ = self.samples.level(level).nearest(grid.points)
+        if file.bounds:
+            distance = numpy.minimum(distance, 1.75)  # where bounds end the points nobody looks for more than a cell's diagonal
+        off = numpy.abs(numpy.abs(voxels) - numpy.minimum(distance, 3.5))
+        off[(distance >= 1.75) & (numpy.abs(voxels) >= 1.75) & bool(file.bounds)] = 0
+        out.count("distances from the surface", len(off))
+        out.ratio("distance from the surface", off.max() / 1e-5)
+        state = self.samples.states(level, grid.points)
+        wrong = (off > 1e-5) | ((state == IN) & (voxels > 0)) | ((state == OUT) & (voxels < 0))
+        if wrong.any():
+            i = numpy.flatnonzero(wrong)[:3]
+            out.problem("surface", f"{grid.name} at {some(grid.points[i])}: {voxels[i]} voxels, expected {distance[i]}, state {state[i]}")
+
     def active_points(self, level):
         """Points that are active in any grid of the level."""
-        grids = [g for g in self.file.grids.values() if g.level == level]
+        grids = [g for g in self.file.grids.values() if g.level == level and not g.name.startswith("surface_level_")]
         points = numpy.concatenate([g.points for g in grids])
         _, first = numpy.unique(numpy.concatenate([g.keys for g in grids]), return_index=True)
         return points[first]

@@ -29,10 +29,10 @@ class PoolOnDevice {
             for (int atlas = 0; atlas < pool.atlases(); ++atlas)
                 for (std::size_t group = 0; group < coding.groupCount(); ++group) {
                     auto& codes = codes_.emplace_back(texels * std::size_t(coding.texelBytes(group)));
-                    auto& coverage = coverage_.emplace_back(texels);
+                    auto& coverage = coverage_.emplace_back(2 * texels);
                     gl.GetTextureImage(pool.codes(atlas, group).id(), 0, coding.pixelFormat(group),
                                        coding.pixelType(), GLsizei(codes.size()), codes.data());
-                    gl.GetTextureImage(pool.coverage(atlas, group).id(), 0, GL_RED, GL_UNSIGNED_BYTE,
+                    gl.GetTextureImage(pool.coverage(atlas, group).id(), 0, GL_RG, GL_UNSIGNED_BYTE,
                                        GLsizei(coverage.size()), coverage.data());
                 }
         });
@@ -68,7 +68,11 @@ class PoolOnDevice {
     }
 
     std::uint8_t coverage(std::uint32_t slot, std::size_t group, const Vec3i& local) const {
-        return coverage_[plane(slot, group)][texel(slot, local)];
+        return coverage_[plane(slot, group)][2 * texel(slot, local)];
+    }
+    /// surfaceCode() less that of the surface.
+    int surface(std::uint32_t slot, std::size_t group, const Vec3i& local) const {
+        return int(coverage_[plane(slot, group)][2 * texel(slot, local) + 1]) - 128;
     }
     /// The bits of a code.
     std::uint32_t bits(std::uint32_t slot, int channel, const Vec3i& local) const {
@@ -113,7 +117,7 @@ class PoolOnDevice {
             for (int row = 0; row < edge * edge; ++row) {
                 const std::size_t first = texel(slot, Vec3i(0, row % edge, row / edge));
                 if (!isSame(codes_, other.codes_, first, bytes)) return false;
-                if (!isSame(coverage_, other.coverage_, first, 1)) return false;
+                if (!isSame(coverage_, other.coverage_, first, 2)) return false;
             }
         }
         return true;

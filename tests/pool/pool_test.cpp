@@ -121,7 +121,8 @@ void extendEverywhere(const BrickTree& tree, const Reconstruction& reconstructio
     const auto channels = std::size_t(store.channels());
     TileMap extension;
     std::vector<double> values(channels);
-    const auto put = [&](int level, const Vec3i& p) {
+    const auto put = [&](int level, const Vec3i& p, bool isCovered) {
+        if (isCovered) return;
         Tile& tile = extension[{level, floorDiv(p, kTileSize)}];
         if (!tile.values) tile.values = std::make_unique<float[]>(channels * kTilePoints);
         const int offset = offsetInTile(p);
@@ -133,7 +134,7 @@ void extendEverywhere(const BrickTree& tree, const Reconstruction& reconstructio
     };
     for (const BrickKey& leaf : tree.leaves())
         forEachLocal([&](const Vec3i& local, std::size_t) {
-            reconstruction.visitOutside(leaf.level, leaf.index * kCells + local, put);
+            reconstruction.visitSources(leaf.level, leaf.index * kCells + local, put);
         });
     store.extension() = std::move(extension);
 }
@@ -193,8 +194,14 @@ std::uint32_t expectedBits(const ValueCoding& coding, double value) {
 }
 
 struct Seen {
-    std::int64_t texels = 0, uncovered = 0, invalid = 0;
+    std::int64_t texels = 0, uncovered = 0, invalid = 0, atSurface = 0;
 };
+
+bool isOnBorder(const Vec3i& local) {
+    for (int a = 0; a < 3; ++a)
+        if (local[a] == 0 || local[a] == kCells) return true;
+    return false;
+}
 
 /// The pool shows the scheduler's leaves, and every texel of their slots is that of the seam rule.
 void expectPool(Bench& bench, Seen& seen) {
@@ -205,7 +212,8 @@ void expectPool(Bench& bench, Seen& seen) {
     const PoolOnDevice device(*bench.pool, *state);
     const std::vector<GrowingLeaf> leaves = bench.scheduler->tree().leaves();
     ASSERT_EQ(leaves.size(), bench.target->bricks().leafCount());
-    std::int64_t wrongValues = 0, wrongTexels = 0, wrongCoverage = 0;
+    std::int64_t wrongValues = 0, wrongTexels = 0, wrongCoverage = 0, wrongSurface = 0;
+    const NearestPointIndex nearest(bench.mesh);
     std::vector<bool> isTaken(bench.pool->capacity());
     for (const GrowingLeaf& leaf : leaves) {
         const auto found =
@@ -235,6 +243,19 @@ void expectPool(Bench& bench, Seen& seen) {
                 const ValueCoding& coding = bench.pool->coding().codings()[std::size_t(c)];
                 wrongTexels += device.bits(slot, c, local) != (isFinite ? expectedBits(coding, value) : 0);
             }
+            if (const double voxels = std::abs(double(values.surface[n]));
+                voxels < kFarFromSurface && !isOnBorder(local)) {
+                const Vec3d place = own.lattice.worldFromIndex(Vec3d(closed.min + local));
+                const double distance = nearest.find(place, 2 * own.lattice.uWorld.x).distanceWorld;
+                wrongSurface += !(std::abs(voxels - distance / own.lattice.uWorld.x) <= 1e-6);
+                wrongSurface += (values.surface[n] < 0) != (own.coverage[n] == 0);
+                ++seen.atSurface;
+            }
+            for (std::size_t group = 0; group < coverage.size(); ++group) {
+                const int code = device.surface(slot, group, local);
+                wrongSurface += !(std::abs(code - double(values.surface[n]) / kFarFromSurface * 127) <= 1) ||
+                                (code < 0) != (values.surface[n] < 0);
+            }
             for (std::size_t group = 0; group < coverage.size(); ++group)
                 wrongCoverage += device.coverage(slot, group, local) != coverage[group];
             ++seen.texels;
@@ -244,6 +265,7 @@ void expectPool(Bench& bench, Seen& seen) {
     EXPECT_EQ(wrongValues, 0);
     EXPECT_EQ(wrongTexels, 0);
     EXPECT_EQ(wrongCoverage, 0);
+    EXPECT_EQ(wrongSurface, 0);
 }
 
 /// From random places the index leads to the scheduler's leaf, or to none.
@@ -324,6 +346,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     expectNoStep(bench, random, 20, acrossDepths);
     EXPECT_GT(seen.texels, 50000);
     EXPECT_GT(seen.uncovered, 1000);
+    EXPECT_GT(seen.atSurface, 1000);
     EXPECT_EQ(seen.invalid > 10, setting.fields.size() > 1);
     EXPECT_GT(acrossDepths, 50);
     EXPECT_GT(bench.target->counts().changed, 0);
@@ -435,7 +458,7 @@ TEST(Pool, ThatIsTooSmallSaysSoAndRecovers) {
 TEST(Pool, TellsItsBytes) {
     TESSERA_NEEDS_GL(kPlatform);
     Bench bench({.format = SampleFormat::r16});
-    const std::int64_t textures = std::int64_t(bench.pool->capacity()) * 729 * (4 * 2 + 1);
+    const std::int64_t textures = std::int64_t(bench.pool->capacity()) * 729 * (4 * 2 + 2);
     EXPECT_EQ(bench.pool->deviceBytes(), textures);
     bench.scheduler->finish({.threads = 1});
     EXPECT_GT(bench.pool->deviceBytes(), textures);

@@ -113,8 +113,17 @@ class StoredBricksTest : public testing::Test {
             ASSERT_EQ(found.walk(middle * std::ldexp(1.0, -other.key.depth.halvings()))->first,
                       target.slotOf(other));
             const std::uint32_t a = *target_->slotOf(leaf), b = *target.slotOf(other);
+            const std::vector<std::uint8_t> isAtSurface = cornersAtSurface(expected, a);
             for (int n = 0; n < kBrickTexels; ++n) {
                 const Vec3i texel = texelAt(n);
+                // A step apart they may be: the file has floats of another unit.
+                const int fromSurface = expected.surface(a, 0, texel), inFile = found.surface(b, 0, texel);
+                if (layers > 0 && isAtSurface[std::size_t(n)]) {
+                    ++atSurface_;
+                    EXPECT_NEAR(inFile, fromSurface, 1) << texel.x << " " << texel.y << " " << texel.z
+                                                        << " depth " << leaf.key.depth.halvings();
+                    EXPECT_EQ(inFile < 0, fromSurface < 0);
+                }
                 const bool isCovered = expected.coverage(a, 0, texel) != 0;
                 const bool isSame = expected.bits(a, 0, texel) == found.bits(b, 0, texel) &&
                                     expected.bits(a, 1, texel) == found.bits(b, 1, texel);
@@ -133,6 +142,21 @@ class StoredBricksTest : public testing::Test {
                 uncovered_ += !isCovered;
             }
         }
+    }
+    /// Whether a texel is a corner of a cell that has corners in the mesh and others.
+    static std::vector<std::uint8_t> cornersAtSurface(const PoolOnDevice& device, std::uint32_t slot) {
+        std::vector<std::uint8_t> isCorner(kBrickTexels);
+        for (int n = 0; n < kCells * kCells * kCells; ++n) {
+            const Vec3i cell(n % kCells, n / kCells % kCells, n / (kCells * kCells));
+            int inside = 0;
+            for (int c = 0; c < 8; ++c) inside += device.surface(slot, 0, cell + cornerOffset(c)) >= 0;
+            if (inside == 0 || inside == 8) continue;
+            for (int c = 0; c < 8; ++c) {
+                const Vec3i p = cell + cornerOffset(c);
+                isCorner[std::size_t((p.z * 9 + p.y) * 9 + p.x)] = 1;
+            }
+        }
+        return isCorner;
     }
     /// Of the cells that hold some places of every element: corners that differ.
     int differentAtTheMesh() const {
@@ -170,7 +194,7 @@ class StoredBricksTest : public testing::Test {
     VdbFile file_;
     StoredBricks stored_;
     std::vector<std::vector<bool>> isSame_;  // by leaf of the file, texel by texel
-    std::int64_t different_ = 0, uncovered_ = 0;
+    std::int64_t different_ = 0, uncovered_ = 0, atSurface_ = 0;
 };
 
 TEST_F(StoredBricksTest, WithAsManyLayersAsCellsAreThoseOfTheMesh) {
@@ -179,6 +203,7 @@ TEST_F(StoredBricksTest, WithAsManyLayersAsCellsAreThoseOfTheMesh) {
     load(kCells, true);
     EXPECT_EQ(different_, 0);
     EXPECT_GT(uncovered_, 1000);
+    EXPECT_GT(atSurface_, 1000);
     EXPECT_EQ(stored_.missingPoints, 0);
     EXPECT_EQ(stored_.estimatedPoints, 0);
     EXPECT_TRUE(stored_.notes.empty());

@@ -61,7 +61,7 @@ class Pictured {
             const PointValues values =
                 target->bricks().valuesAt(leaf, target->bricks().closedPoints(leaf.key));
             BrickPoints& brick = points[std::size_t(at)];
-            brick.covered = values.covered;
+            brick.surface = values.surface;
             for (std::size_t p = 0; p < values.covered.size(); ++p)
                 brick.values.push_back(float(values.values[2 * p + 1]));
         }

@@ -26,10 +26,10 @@ int markAt(ivec3 texel) {
     return int(texelFetch(coverage, texel, 0).r * 255.0 + 0.5);
 }
 
-// Above 0 in the mesh: coverage less a half.
+// The distance from the mesh's surface in some unit, above 0 in the mesh.
 float coverInCell(ivec3 cell, vec3 within) {
     float corners[8];
-    for (int c = 0; c < 8; ++c) corners[c] = markAt(cell + cornerOf(c)) > 0 ? 0.5 : -0.5;
+    for (int c = 0; c < 8; ++c) corners[c] = texelFetch(coverage, cell + cornerOf(c), 0).g - 128.0 / 255.0;
     return interpolate(corners, within);
 }
 
