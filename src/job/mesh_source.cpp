@@ -60,7 +60,7 @@ MeshSource::MeshSource(const TetMesh& mesh, const Scene& scene, int threads, GlT
     options.threads = threads;
     live_ = std::make_unique<LiveBricks>(mesh_, 0, findResampler("software"), options, SampleFormat::r32f,
                                          thread, execution);
-    bounds_ = meshBounds(mesh_, execution);
+    bounds_ = live_->scheduler().frame().meshBoundsWorld;
 }
 
 bool MeshSource::setFocus(const Scene& scene) {

@@ -34,6 +34,9 @@ class LiveBricks {
     /// Throws GlMemoryError where that doesn't hold the coarsest bricks.
     bool update(BrickScheduler::Clock::time_point deadline, const Execution& execution);
 
+    /// BrickScheduler::showCoarsest(), in the pool too.
+    void showCoarsest(const Execution& execution) { scheduler_->showCoarsest(execution); }
+
     /// Another device takes the place of the one before, which may be lost: everything is uploaded again.
     /// Throws GlError.
     void moveTo(GlThread& thread);

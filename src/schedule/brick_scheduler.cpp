@@ -36,9 +36,10 @@ int channelsOf(const TetMesh& mesh, std::span<const int> fields) {
     return channels;
 }
 
-BindOptions bindOptions(const ScheduleOptions& options, std::shared_ptr<const SharedElementIndex> index) {
+BindOptions bindOptions(const ScheduleOptions& options, std::shared_ptr<const SharedElementIndex> index,
+                        Route route) {
     BindOptions bind = options.refine.bind;
-    bind.route = Route::index;
+    bind.route = route;
     bind.index = std::move(index);
     return bind;
 }
@@ -92,7 +93,7 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
                                const ScheduleOptions& options, BrickTarget& target,
                                const Execution& execution)
     : index_(indexOf(mesh, options)),
-      bound_(resampler.bind(mesh, fields, bindOptions(options, index_))),
+      bound_(resampler.bind(mesh, fields, bindOptions(options, index_, Route::index))),
       bricks_(index_, frameOf(mesh, options, index_->get(execution)),
               options.refine.criterion.has(Criterion::elementSize) ? options.refine.samplesPerElement : 0,
               execution),
@@ -103,6 +104,8 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
       wishes_(firstWishes(mesh, fields, options, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
                 options.archive, options.threads) {
+    if (!wishes_.inspector && !options.archive)
+        passing_ = resampler.bind(mesh, fields, bindOptions(options, index_, Route::pass));
     replan();
     beginRoots();
 }
@@ -401,6 +404,33 @@ bool BrickScheduler::workUntil(Clock::time_point deadline, const Execution& exec
         publishFinished();
         if (Clock::now() >= deadline) return false;
     }
+}
+
+void BrickScheduler::showCoarsest(const Execution& execution) {
+    if (hasRoots_ || !passing_) return;
+    Change roots = std::move(changes_.front());
+    changes_.pop_front();
+    abandon(roots);
+    const PlanFrame& frame = bricks_.frame();
+    std::vector<IndexBox> boxes;
+    for (const Vec3i& root : bricks_.roots())
+        boxes.push_back({root * frame.brickCells, (root + 1) * frame.brickCells + 1});
+    std::vector<std::shared_ptr<const Block>> samples(boxes.size());
+    try {
+        passing_->resample(
+            Lattice::axisParallel(frame.originWorld, frame.rootSpacingWorld), boxes,
+            [&](std::size_t root, const Block& block) {
+                samples[root] = std::make_shared<const Block>(block);
+            },
+            execution.withoutProgress());
+    } catch (...) {
+        beginRoots();
+        throw;
+    }
+    for (std::size_t root = 0; root < samples.size(); ++root)
+        memory_.add(MeshBricks::Number(root), std::move(samples[root]));
+    counts_.sampled += std::int64_t(samples.size());
+    show(roots);
 }
 
 void BrickScheduler::finish(const Execution& execution) {

@@ -95,6 +95,10 @@ class BrickScheduler {
     bool publish(const Execution& execution = {}) { return update(Clock::now(), execution); }
     /// Until it is at rest.
     void finish(const Execution& execution = {});
+    /// Samples and shows the coarsest bricks, before anything else was shown, by one pass over the mesh on
+    /// all threads: sooner than by update(), but without a deadline. Does nothing where they are shown, and
+    /// where bricks are judged by their values or there is an archive.
+    void showCoarsest(const Execution& execution = {});
 
     /// The leaves shown; none before the coarsest bricks are there.
     const GrowingTree& tree() const { return tree_; }
@@ -159,6 +163,7 @@ class BrickScheduler {
 
     std::shared_ptr<const SharedElementIndex> index_;
     std::unique_ptr<BoundResampler> bound_;
+    std::unique_ptr<BoundResampler> passing_;  ///< by passes over the mesh; null: not to be used
     MeshBricks bricks_;
     BrickTarget& target_;
     std::int64_t brickBytes_;

@@ -183,8 +183,12 @@ void ViewSession::begin(const std::string& path, std::shared_ptr<const MeshFile>
         }
         if (!opened.file) opened.file = std::make_shared<const MeshFile>(openMesh(opened.path, {}, job));
         const int threads = sharesProcessor_ ? 0 : std::max(1, job.execution.threadCount() - 1);
-        opened.source =
-            makeMeshSource(opened.path, opened.file->mesh, asked, threads, *thread_, job.execution);
+        opened.readAt = Clock::now();
+        auto source = makeMeshSource(opened.path, opened.file->mesh, asked, threads, *thread_, job.execution);
+        opened.madeAt = Clock::now();
+        source->live().showCoarsest(job.execution);
+        opened.coarsestAt = Clock::now();
+        opened.source = std::move(source);
         return std::move(opened);
     });
 }
@@ -207,6 +211,9 @@ void ViewSession::takeOpened() {
     mesh_ = dynamic_cast<MeshSource*>(source_.get());
     file_ = std::move(opened.file);
     path_ = opened.path;
+    readAt_ = opened.readAt;
+    madeAt_ = opened.madeAt;
+    coarsestAt_ = opened.coarsestAt;
     followed_ = 0;
     isRefined_ = mesh_ == nullptr;
     shown_ = {};

@@ -61,6 +61,12 @@ class ViewSession {
     /// Of what is shown; empty: nothing.
     const std::string& path() const { return path_; }
 
+    /// When the mesh that is shown had been read, when it had been looked at, before the first brick was
+    /// sampled, and when its coarsest bricks were in the pool.
+    Clock::time_point readAt() const { return readAt_; }
+    Clock::time_point madeAt() const { return madeAt_; }
+    Clock::time_point coarsestAt() const { return coarsestAt_; }
+
     SceneDocument& document() { return document_; }
     const SceneDocument& document() const { return document_; }
     /// Of the part of the window that shows pictures.
@@ -131,6 +137,7 @@ class ViewSession {
         std::shared_ptr<const MeshFile> file;  // null: a .vdb file
         Scene scene;                           // that the source is for
         std::unique_ptr<PictureSource> source;
+        Clock::time_point readAt{}, madeAt{}, coarsestAt{};
     };
     /// What a picture is of.
     struct Shown {
@@ -163,6 +170,7 @@ class ViewSession {
 
     SceneDocument document_;
     std::string path_;
+    Clock::time_point readAt_, madeAt_, coarsestAt_;
     std::shared_ptr<const MeshFile> file_;
     std::unique_ptr<PictureSource> source_;
     MeshSource* mesh_ = nullptr;
