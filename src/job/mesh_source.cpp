@@ -35,7 +35,7 @@ Field scalarOf(const Field& field, std::optional<int> component, const Execution
 
 MeshSource::MeshSource(const TetMesh& mesh, const Scene& scene, int threads, GlThread& thread,
                        const Execution& execution)
-    : mesh_{mesh.points, mesh.tets, {}} {
+    : threads_(execution.threads), mesh_{mesh.points, mesh.tets, {}} {
     std::vector<FieldChoice> choices;
     if (!scene.field.empty()) choices.push_back({scene.field, scene.field});
     const FieldSelection selection = selectFields(mesh, choices);
@@ -79,16 +79,26 @@ std::optional<PictureSource::Samples> MeshSource::samplesAt(const Vec3d& placeWo
 // The mean of an element's values stands for its volume.
 void MeshSource::fill(ValueHistogram& histogram) const {
     const Field& field = mesh_.fields[0];
-    for (std::size_t e = 0; e < mesh_.tets.size(); ++e) {
+    const auto valueOf = [&](std::size_t e) {
+        if (field.location == FieldLocation::cell) return field.values[e];
         double value = 0;
-        if (field.location == FieldLocation::cell)
-            value = field.values[e];
-        else
-            for (const std::int32_t node : mesh_.tets[e]) value += 0.25 * field.values[std::size_t(node)];
-        const auto& tet = mesh_.tets[e];
-        const auto corner = [&](std::size_t c) { return mesh_.points[std::size_t(tet[c])]; };
-        histogram.add(value, std::abs(sixfoldVolume(corner(0), corner(1), corner(2), corner(3)).value));
-    }
+        for (const std::int32_t node : mesh_.tets[e]) value += 0.25 * field.values[std::size_t(node)];
+        return value;
+    };
+    // Part by part, so that sums don't depend on threads.
+    constexpr std::int64_t kPart = 65536;
+    const std::int64_t count = mesh_.elementCount();
+    std::vector<ValueHistogram> parts(std::size_t((count + kPart - 1) / kPart), histogram);
+    parallelFor({.threads = threads_}, std::int64_t(parts.size()), [&](std::int64_t part) {
+        for (std::int64_t e = part * kPart; e < std::min((part + 1) * kPart, count); ++e) {
+            const auto& tet = mesh_.tets[std::size_t(e)];
+            const auto corner = [&](std::size_t c) { return mesh_.points[std::size_t(tet[c])]; };
+            parts[std::size_t(part)].add(
+                valueOf(std::size_t(e)),
+                std::abs(sixfoldVolume(corner(0), corner(1), corner(2), corner(3)).value));
+        }
+    });
+    for (const ValueHistogram& part : parts) histogram.add(part);
 }
 
 std::unique_ptr<MeshSource> makeMeshSource(const std::string& path, const TetMesh& mesh, const Scene& scene,

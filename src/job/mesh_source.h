@@ -44,6 +44,7 @@ class MeshSource : public PictureSource {
   private:
     void fill(ValueHistogram& histogram) const override;
 
+    int threads_;
     TetMesh mesh_;  // with the one field that is shown
     std::vector<PictureField> fieldsThere_;
     std::string title_;

@@ -16,6 +16,11 @@ void ValueHistogram::add(double value, double volume) {
     all_ += volume;
 }
 
+void ValueHistogram::add(const ValueHistogram& other) {
+    for (std::size_t bin = 0; bin < shares_.size(); ++bin) shares_[bin] += other.shares_[bin];
+    all_ += other.all_;
+}
+
 std::vector<double> ValueHistogram::shares() const {
     std::vector<double> shares = shares_;
     for (double& share : shares) share = all_ > 0 ? share / all_ : 0;

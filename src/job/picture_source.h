@@ -26,6 +26,8 @@ class ValueHistogram {
     explicit ValueHistogram(const std::array<double, 2>& range) : range_(range), shares_(kHistogramBins) {}
     /// What lies outside the range, or isn't finite, isn't counted.
     void add(double value, double volume);
+    /// What another one of the same range has counted.
+    void add(const ValueHistogram& other);
     /// Of what was counted: bins of one width over the range.
     std::vector<double> shares() const;
 

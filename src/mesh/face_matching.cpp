@@ -51,8 +51,8 @@ FaceRecord recordOf(const std::array<std::int32_t, 4>& tet, std::int64_t element
             std::uint32_t(c) * 2 + (tet[f] > c), std::uint32_t(element) * 4 + std::uint32_t(f)};
 }
 
-/// All faces, in buckets by the high bits of their hash. Built by counting, so that every chunk of elements
-/// writes to its own places.
+/// All faces that may count, in buckets by the high bits of their hash. Built by counting, so that every
+/// chunk of elements writes to its own places.
 struct FaceBuckets {
     int shift = 0;
     std::vector<std::int64_t> begin;
@@ -61,11 +61,14 @@ struct FaceBuckets {
     std::int64_t count() const { return std::int64_t(begin.size()) - 1; }
 };
 
-FaceBuckets bucketFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat, const Execution& execution) {
+/// @param faceCount about as many as mayCount(record) takes.
+template <class MayCount>
+FaceBuckets bucketFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat, std::int64_t faceCount,
+                        const MayCount& mayCount, const Execution& execution) {
     const std::int64_t elements = mesh.elementCount();
     const std::int64_t chunks = (elements + kElementChunk - 1) / kElementChunk;
     FaceBuckets buckets;
-    const int bits = std::max(1, int(std::bit_width(std::uint64_t(4 * elements / kBucketFaces))));
+    const int bits = std::max(1, int(std::bit_width(std::uint64_t(faceCount / kBucketFaces))));
     buckets.shift = 64 - bits;
     const std::size_t bucketCount = std::size_t(1) << bits;
     const auto forEachFace = [&](std::int64_t chunk, const auto& visit) {
@@ -74,7 +77,7 @@ FaceBuckets bucketFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat,
             for (std::size_t f = 0; f < 4; ++f) {
                 const FaceRecord record =
                     recordOf(mesh.tets[std::size_t(e)], e, f, flat[std::size_t(e)] != 0);
-                visit(record, std::size_t(record.hash() >> buckets.shift));
+                if (mayCount(record)) visit(record, std::size_t(record.hash() >> buckets.shift));
             }
     };
     std::vector<std::vector<std::int64_t>> cursors{std::size_t(chunks)};
@@ -212,19 +215,59 @@ std::vector<BoundaryFace> collectFaces(const TetMesh& mesh, const std::vector<st
     return faces;
 }
 
-}  // namespace
-
-FaceMatching matchFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat, const Execution& execution) {
+void checkFlags(const TetMesh& mesh, std::span<const std::uint8_t> flat) {
     TESSERA_CHECK(flat.size() == mesh.tets.size(), "one flag an element");
     TESSERA_CHECK(mesh.elementCount() < (std::int64_t(1) << 30), "at most 2^30 elements");
-    const FaceBuckets buckets = bucketFaces(mesh, flat, execution);
-    std::vector<std::uint8_t> isBoundary(mesh.tets.size(), 0);
-    std::atomic<std::int64_t> single{0}, paired{0}, crowded{0}, duplicate{0};
+}
+
+/// Calls look(matcher) for the matchers of all buckets, once each; they set the bits of elements.
+template <class Look>
+void matchBuckets(const TetMesh& mesh, const FaceBuckets& buckets, std::vector<std::uint8_t>& isBoundary,
+                  const Execution& execution, const Look& look) {
     parallelForChunks(execution, buckets.count(), 8, [&](std::int64_t first, std::int64_t last) {
         BucketMatcher matcher(mesh, isBoundary);
         for (std::int64_t b = first; b < last; ++b)
             matcher.match({buckets.records.get() + buckets.begin[std::size_t(b)],
                            buckets.records.get() + buckets.begin[std::size_t(b) + 1]});
+        look(matcher);
+    });
+}
+
+}  // namespace
+
+std::vector<BoundaryFace> matchBoundary(const TetMesh& mesh, std::span<const std::uint8_t> flat,
+                                        const Execution& execution) {
+    checkFlags(mesh, flat);
+    // The faces of which a node is the smallest, each as a number, exclusive or: 0 where each of them has an
+    // even number of elements that aren't flat. Then none is on the boundary, but for one chance in 2^64.
+    std::vector<std::uint64_t> odd(mesh.points.size(), 0);
+    parallelForChunks(execution, mesh.elementCount(), kElementChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          for (std::int64_t e = begin; e < end; ++e) {
+                              if (flat[std::size_t(e)]) continue;
+                              for (std::size_t f = 0; f < 4; ++f) {
+                                  const FaceRecord record = recordOf(mesh.tets[std::size_t(e)], e, f, false);
+                                  std::atomic_ref(odd[record.smallest / 2])
+                                      .fetch_xor(record.hash(), std::memory_order_relaxed);
+                              }
+                          }
+                      });
+    const auto mayCount = [&](const FaceRecord& record) {
+        return !record.isFlat() && odd[record.smallest / 2] != 0;
+    };
+    const FaceBuckets buckets = bucketFaces(mesh, flat, mesh.elementCount(), mayCount, execution);
+    std::vector<std::uint8_t> isBoundary(mesh.tets.size(), 0);
+    matchBuckets(mesh, buckets, isBoundary, execution, [](const BucketMatcher&) {});
+    return collectFaces(mesh, isBoundary, 0);
+}
+
+FaceMatching matchFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat, const Execution& execution) {
+    checkFlags(mesh, flat);
+    const auto all = [](const FaceRecord&) { return true; };
+    const FaceBuckets buckets = bucketFaces(mesh, flat, 4 * mesh.elementCount(), all, execution);
+    std::vector<std::uint8_t> isBoundary(mesh.tets.size(), 0);
+    std::atomic<std::int64_t> single{0}, paired{0}, crowded{0}, duplicate{0};
+    matchBuckets(mesh, buckets, isBoundary, execution, [&](const BucketMatcher& matcher) {
         single += matcher.counts.single;
         paired += matcher.counts.paired;
         crowded += matcher.counts.crowded;

@@ -21,6 +21,10 @@ struct FaceMatching {
     std::int64_t duplicateElements = 0;  ///< elements with the same four nodes as an earlier one
 };
 
+/// FaceMatching::boundary alone, in less than half of the time.
+std::vector<BoundaryFace> matchBoundary(const TetMesh& mesh, std::span<const std::uint8_t> flat,
+                                        const Execution& execution);
+
 /// @param flat one entry an element, not 0: of zero volume. Throws InternalError above 2^30 elements.
 FaceMatching matchFaces(const TetMesh& mesh, std::span<const std::uint8_t> flat, const Execution& execution);
 

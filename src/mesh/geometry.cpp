@@ -54,7 +54,7 @@ std::vector<BoundaryFace> boundaryFaces(const TetMesh& mesh, int threads) {
                            mesh.points[std::size_t(tet[2])], mesh.points[std::size_t(tet[3])]) == 0;
         }
     });
-    return matchFaces(mesh, flat, execution).boundary;
+    return matchBoundary(mesh, flat, execution);
 }
 
 }  // namespace tessera

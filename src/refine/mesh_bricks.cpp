@@ -1,11 +1,13 @@
 #include "refine/mesh_bricks.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <limits>
 #include <utility>
 
 #include "base/check.h"
+#include "base/parallel.h"
 #include "refine/brick_touch.h"
 #include "refine/element_size.h"
 #include "refine/wishes.h"
@@ -19,12 +21,22 @@ bool meet(const Box3d& a, const Box3d& b) {
            a.max.y >= b.min.y && a.max.z >= b.min.z;
 }
 
+// In the order of z, y, x.
+template <class Visit>
+void forEachIn(const BrickRange& range, const Visit& visit) {
+    Vec3i at;
+    for (at.z = range.min.z; at.z <= range.max.z; ++at.z)
+        for (at.y = range.min.y; at.y <= range.max.y; ++at.y)
+            for (at.x = range.min.x; at.x <= range.max.x; ++at.x) visit(at);
+}
+
+constexpr std::int64_t kElementsATask = 4096;
+
 }  // namespace
 
 MeshBricks::MeshBricks(std::shared_ptr<const SharedElementIndex> index, const PlanFrame& frame,
                        double samplesPerElement, const Execution& execution)
     : shared_(std::move(index)),
-      index_(shared_->get(execution)),
       mesh_(shared_->mesh()),
       frame_(frame),
       rootRange_(clippedRange(frame, Depth(0))),
@@ -33,31 +45,71 @@ MeshBricks::MeshBricks(std::shared_ptr<const SharedElementIndex> index, const Pl
         sizes_ = elementSizes(mesh_, frame.rootSpacingWorld, frame.boundsWorld, execution.withoutProgress());
     for (Depth depth; depth <= frame.maxDepth + 1; depth = depth + 1)
         spacings_.push_back(frame.spacingWorld(depth));
-    findRoots();
+    findRoots(execution);
 }
 
-void MeshBricks::findRoots() {
-    const BrickRange& all = rootRange_;
-    for (Vec3i root = all.min; root.z <= all.max.z; ++root.z)
-        for (root.y = all.min.y; root.y <= all.max.y; ++root.y)
-            for (root.x = all.min.x; root.x <= all.max.x; ++root.x) {
-                const DepthKey key{Depth(0), root};
-                if (!insideBounds(key, frame_)) continue;
-                const Box3d box = boxAround(key, frame_);
-                const BrickPath path(mesh_, frame_, all, key);
-                std::int32_t shownBy = kNoElement;
-                index_.walk([&](const Box3d& near) { return shownBy == kNoElement && meet(near, box); },
-                            [&](std::int32_t e) {
-                                if (shownBy == kNoElement && path.holds(e)) shownBy = e;
-                            });
-                if (shownBy == kNoElement) continue;
-                roots_.push_back(root);
-                Brick& brick = bricks_.add();
-                brick.key = key;
-                brick.shownBy = shownBy;
-            }
+void MeshBricks::findRoots(const Execution& execution) {
+    // One of many roots is found faster by the index.
+    constexpr double kMostInAPass = 4096;
+    const Vec3d count = Vec3d(rootRange_.max - rootRange_.min) + 1.0;
+    const bool isByPass =
+        !shared_->ifBuilt() && !frame_.boundsWorld && count.x * count.y * count.z <= kMostInAPass;
+    const std::vector<std::int32_t> shownBy =
+        isByPass ? rootsShown(execution) : rootsShown(shared_->get(execution));
+    std::size_t n = 0;
+    forEachIn(rootRange_, [&](const Vec3i& root) {
+        const std::int32_t element = shownBy[n++];
+        if (element == kNoElement) return;
+        roots_.push_back(root);
+        Brick& brick = bricks_.add();
+        brick.key = {Depth(0), root};
+        brick.shownBy = element;
+    });
     rootNumbers_ = RootGrid<Number>(roots_);
     for (std::size_t r = 0; r < roots_.size(); ++r) rootNumbers_.slot(roots_[r]) = Number(r) + 1;
+}
+
+std::vector<std::int32_t> MeshBricks::rootsShown(const ElementIndex& index) const {
+    std::vector<std::int32_t> shown;
+    forEachIn(rootRange_, [&](const Vec3i& root) {
+        std::int32_t& shownBy = shown.emplace_back(kNoElement);
+        const DepthKey key{Depth(0), root};
+        if (!insideBounds(key, frame_)) return;
+        const Box3d box = boxAround(key, frame_);
+        const BrickPath path(mesh_, frame_, rootRange_, key);
+        index.walk([&](const Box3d& near) { return shownBy == kNoElement && meet(near, box); },
+                   [&](std::int32_t e) {
+                       if (shownBy == kNoElement && path.holds(e)) shownBy = e;
+                   });
+    });
+    return shown;
+}
+
+// The first element of each, whatever the threads.
+std::vector<std::int32_t> MeshBricks::rootsShown(const Execution& execution) const {
+    const Vec3i size = rootRange_.max - rootRange_.min + 1;
+    const std::int64_t elements = mesh_.elementCount();
+    std::vector<std::int32_t> shown(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z),
+                                    std::numeric_limits<std::int32_t>::max());
+    parallelForChunks(execution, elements, kElementsATask, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t e = begin; e < end; ++e) {
+            prefetchNodes(mesh_, std::min(e + kPrefetchElements, elements - 1));
+            const ElementOverlap own = overlapOf(mesh_, frame_, std::int32_t(e), Depth(0));
+            const BrickRange range = rootsMeeting(own, frame_, rootRange_);
+            forEachIn(range, [&](const Vec3i& root) {
+                const Vec3i at = root - rootRange_.min;
+                const std::atomic_ref<std::int32_t> first(
+                    shown[std::size_t((at.z * size.y + at.y) * size.x + at.x)]);
+                std::int32_t known = first.load(std::memory_order_relaxed);
+                if (known <= e || !touchesRoot(own, range, root, frame_)) return;
+                while (e < known && !first.compare_exchange_weak(known, std::int32_t(e))) {
+                }
+            });
+        }
+    });
+    for (std::int32_t& element : shown)
+        if (element == std::numeric_limits<std::int32_t>::max()) element = kNoElement;
+    return shown;
 }
 
 std::optional<MeshBricks::Number> MeshBricks::find(const DepthKey& key) const {
@@ -110,7 +162,7 @@ void MeshBricks::findChildren(Number brick) {
         if ((missing & asked) == 0) return;
         const Vec3d world = frame_.originWorld + point * spacing;
         found_.clear();
-        index_.query({world, world}, found_);
+        index().query({world, world}, found_);
         for (const std::int32_t e : found_)
             if (overlap(e).holds(point)) return show(e, missing & asked);
         for (const std::int32_t e : found_) showTouched(e, asked);
@@ -131,7 +183,7 @@ void MeshBricks::findChildren(Number brick) {
                 if (meet(near, boxes[std::size_t(std::countr_zero(bits))])) return true;
             return false;
         };
-        index_.walk(mayShow, [&](std::int32_t e) { showTouched(e, 0xff); });
+        index().walk(mayShow, [&](std::int32_t e) { showTouched(e, 0xff); });
     }
     const std::size_t first = bricks_.size();
     TESSERA_CHECK(first + 8 < ~Number(0), "too many bricks were looked at");
@@ -188,7 +240,7 @@ Box3d MeshBricks::boxWorld(const DepthKey& key) const {
 
 std::int64_t MeshBricks::elementsNear(Number brick) {
     std::int32_t& count = bricks_[brick].elementsNear;
-    if (count < 0) count = std::int32_t(index_.countAbout(boxAround(key(brick), frame_)));
+    if (count < 0) count = std::int32_t(index().countAbout(boxAround(key(brick), frame_)));
     return count;
 }
 
@@ -198,7 +250,7 @@ double MeshBricks::wishedByElementSize(Number brick) {
     if (wished >= 0) return double(wished) * frame_.rootSpacingWorld / samplesPerElement_;
     found_.clear();
     foundSizes_.clear();
-    index_.query(boxAround(key(brick), frame_), found_);
+    index().query(boxAround(key(brick), frame_), found_);
     const BrickPath path(mesh_, frame_, rootRange_, key(brick));
     for (const std::int32_t e : found_)
         if (sizes_[std::size_t(e)] > 0 && path.holds(e)) foundSizes_.push_back(sizes_[std::size_t(e)]);
@@ -219,7 +271,7 @@ const ValueMask& MeshBricks::values(Number brick, const BrickInspector& inspecto
     std::unique_ptr<const ValueMask>& values = bricks_[brick].values;
     if (!values) {
         found_.clear();
-        index_.query(boxAround(key(brick), frame_), found_);
+        index().query(boxAround(key(brick), frame_), found_);
         values = std::make_unique<const ValueMask>(inspector.binsOf(found_));
     }
     return *values;

@@ -29,9 +29,10 @@ class MeshBricks {
     /// A brick's number; children are found by those of their parent.
     using Number = std::uint32_t;
 
-    /// Builds the index if it isn't there, and with `samplesPerElement` passes over the mesh for the sizes of
-    /// its elements. The index and its mesh must outlive it. @param samplesPerElement what
-    /// RefineOptions::samplesPerElement says; 0: element sizes aren't wanted.
+    /// Passes over the mesh where the index isn't built yet, which is then built when a brick of depth 0 is
+    /// looked into, and with `samplesPerElement` for the sizes of its elements. The index and its mesh must
+    /// outlive it. @param samplesPerElement what RefineOptions::samplesPerElement says; 0: element sizes
+    /// aren't wanted.
     MeshBricks(std::shared_ptr<const SharedElementIndex> index, const PlanFrame& frame,
                double samplesPerElement, const Execution& execution);
 
@@ -90,13 +91,16 @@ class MeshBricks {
         std::unique_ptr<const ValueMask> values;
     };
 
-    void findRoots();
+    const ElementIndex& index() const { return shared_->get(); }
+    void findRoots(const Execution& execution);
+    /// An element that touches each of the bricks of depth 0 that may be; kNoElement without one.
+    std::vector<std::int32_t> rootsShown(const ElementIndex& index) const;
+    std::vector<std::int32_t> rootsShown(const Execution& execution) const;
     void findChildren(Number brick);
     std::optional<Number> look(const DepthKey& key);
     Box3d boxWorld(const DepthKey& key) const;
 
     std::shared_ptr<const SharedElementIndex> shared_;
-    const ElementIndex& index_;
     const TetMesh& mesh_;
     PlanFrame frame_;
     std::vector<double> spacings_;  ///< by depth, world units

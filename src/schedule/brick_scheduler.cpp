@@ -19,9 +19,10 @@ namespace {
 /// beside what is shown.
 constexpr std::size_t kLargestChange = 8;
 
-PlanFrame frameOf(const TetMesh& mesh, const ScheduleOptions& options, const ElementIndex& index) {
+PlanFrame frameOf(const TetMesh& mesh, const ScheduleOptions& options, const ElementIndex* index,
+                  const Execution& execution) {
     const RefineOptions& refine = options.refine;
-    const Box3d& box = index.boundsWorld();
+    const Box3d box = meshBounds(mesh, execution, index);
     RefineOptions withFocus = refine;
     if (withFocus.focus.empty()) withFocus.focus.push_back(pointFocus(box.min, 1));
     checkOptions(mesh, box, withFocus);
@@ -61,10 +62,11 @@ int channelOf(const TetMesh& mesh, std::span<const int> fields, const std::strin
 }
 
 Wishes firstWishes(const TetMesh& mesh, std::span<const int> fields, const ScheduleOptions& options,
-                   std::shared_ptr<const SharedElementIndex> index, const Execution& execution) {
+                   const Box3d& meshBoundsWorld, std::shared_ptr<const SharedElementIndex> index,
+                   const Execution& execution) {
     const RefineOptions& refine = options.refine;
     Wishes wishes{.focus = refine.focus,
-                  .finestSpacingWorld = focusSpacing(index->get().boundsWorld(), refine),
+                  .finestSpacingWorld = focusSpacing(meshBoundsWorld, refine),
                   .byError = refine.criterion.has(Criterion::error)};
     if (!refine.criterion.has(Criterion::focus)) wishes.focus.clear();
     if (!wishes.byError && !options.transferFunction) return wishes;
@@ -94,20 +96,19 @@ BrickScheduler::BrickScheduler(const TetMesh& mesh, std::span<const int> fields,
                                const Execution& execution)
     : index_(indexOf(mesh, options)),
       bound_(resampler.bind(mesh, fields, bindOptions(options, index_, Route::index))),
-      bricks_(index_, frameOf(mesh, options, index_->get(execution)),
+      bricks_(index_, frameOf(mesh, options, index_->ifBuilt(), execution),
               options.refine.criterion.has(Criterion::elementSize) ? options.refine.samplesPerElement : 0,
               execution),
       target_(target),
       brickBytes_(bytesOfBrick(channelsOf(mesh, fields), options.refine.brickCells)),
       budgetBytes_(options.budgetBytes),
       watchedField_(options.transferFunction ? options.transferFunction->field : ""),
-      wishes_(firstWishes(mesh, fields, options, index_, execution)),
+      wishes_(firstWishes(mesh, fields, options, bricks_.frame().meshBoundsWorld, index_, execution)),
       sampling_(*bound_, index_, bricks_.frame(), wishes_.byError ? wishes_.inspector : nullptr,
                 options.archive, options.threads) {
     if (!wishes_.inspector && !options.archive)
         passing_ = resampler.bind(mesh, fields, bindOptions(options, index_, Route::pass));
     replan();
-    beginRoots();
 }
 
 BrickScheduler::~BrickScheduler() = default;
@@ -171,7 +172,10 @@ void BrickScheduler::setBudget(std::int64_t budgetBytes) {
 }
 
 void BrickScheduler::replan() {
-    plan_ = std::make_unique<WishPlan>(bricks_, wishes_, limit());
+    const PlanLimit most = limit();
+    plan_.reset();
+    // Making a plan may build the index, which the coarsest bricks don't need.
+    if (index_->ifBuilt()) plan_ = std::make_unique<WishPlan>(bricks_, wishes_, most);
     next_.reset();
     hasRanked_ = isAtRest_ = false;
     ++planNumber_;
@@ -180,6 +184,11 @@ void BrickScheduler::replan() {
         abandon(changes_.back());
         changes_.pop_back();
     }
+}
+
+WishPlan& BrickScheduler::plan() {
+    if (!plan_) plan_ = std::make_unique<WishPlan>(bricks_, wishes_, limit());
+    return *plan_;
 }
 
 void BrickScheduler::abandon(const Change& change) {
@@ -240,8 +249,8 @@ bool BrickScheduler::beginChange(const WishPlan::Split& split) {
 bool BrickScheduler::fillQueue(Clock::time_point deadline) {
     constexpr std::size_t kAtOnce = 8;
     while (changes_.size() < kAtOnce && hasRoots_) {
-        if (!next_) next_ = plan_->next();
-        if (!next_) return !plan_->waitsFor().empty();
+        if (!next_) next_ = plan().next();
+        if (!next_) return !plan().waitsFor().empty();
         // An older plan's change will be shown, or prove to have lost what it stands on: then it is begun
         // anew.
         if (std::any_of(changes_.begin(), changes_.end(),
@@ -337,8 +346,8 @@ bool BrickScheduler::mergeLeastUseful() {
         if (!hasRanked_) {
             std::vector<std::pair<double, MeshBricks::Number>> ranked;
             for (MeshBricks::Number brick = 0; brick < isSplit_.size(); ++brick)
-                if (isSplit_[brick] && !plan_->isSplit(brick))
-                    ranked.emplace_back(plan_->valueOfSplit(brick), brick);
+                if (isSplit_[brick] && !plan().isSplit(brick))
+                    ranked.emplace_back(plan().valueOfSplit(brick), brick);
             std::sort(ranked.begin(), ranked.end(), [&](const auto& a, const auto& b) {
                 return a.first != b.first ? a.first > b.first
                                           : inStorageOrder(bricks_.key(a.second), bricks_.key(b.second));
@@ -350,7 +359,7 @@ bool BrickScheduler::mergeLeastUseful() {
         }
         for (std::size_t i = leastUseful_.size(); i-- > 0;) {
             const MeshBricks::Number brick = leastUseful_[i];
-            if (plan_->isSplit(brick) || !merge(brick)) continue;
+            if (plan().isSplit(brick) || !merge(brick)) continue;
             leastUseful_.erase(leastUseful_.begin() + std::ptrdiff_t(i));
             return true;
         }
@@ -375,7 +384,8 @@ bool BrickScheduler::merge(MeshBricks::Number brick) {
 }
 
 ScheduleProgress BrickScheduler::progress() const {
-    return {tree_.leafCount(), plan_->leafCount(), reserved_, bytes(), budgetBytes_};
+    return {tree_.leafCount(), plan_ ? plan_->leafCount() : bricks_.roots().size(), reserved_, bytes(),
+            budgetBytes_};
 }
 
 bool BrickScheduler::update(Clock::time_point deadline, const Execution& execution) {
@@ -389,13 +399,14 @@ bool BrickScheduler::update(Clock::time_point deadline, const Execution& executi
 
 // True when nothing is left to do.
 bool BrickScheduler::workUntil(Clock::time_point deadline, const Execution& execution) {
+    if (!hasRoots_ && changes_.empty()) beginRoots();
     publishFinished();
     while (true) {
         execution.throwIfCancelled();
         const bool planGoesOn = fillQueue(deadline);
         if (changes_.empty() && !planGoesOn && !mergeLeastUseful()) return true;
         TESSERA_CHECK(!changes_.empty() || !planGoesOn || next_ || Clock::now() >= deadline || !hasRoots_ ||
-                          plan_->waitsFor().empty(),
+                          plan().waitsFor().empty(),
                       "a plan waits for bricks that nobody samples");
         if (!changes_.empty())
             sampling_.work(deadline, execution, [&] {
@@ -408,29 +419,23 @@ bool BrickScheduler::workUntil(Clock::time_point deadline, const Execution& exec
 
 void BrickScheduler::showCoarsest(const Execution& execution) {
     if (hasRoots_ || !passing_) return;
-    Change roots = std::move(changes_.front());
-    changes_.pop_front();
-    abandon(roots);
+    if (!changes_.empty()) {
+        abandon(changes_.front());
+        changes_.pop_front();
+    }
     const PlanFrame& frame = bricks_.frame();
     std::vector<IndexBox> boxes;
     for (const Vec3i& root : bricks_.roots())
         boxes.push_back({root * frame.brickCells, (root + 1) * frame.brickCells + 1});
     std::vector<std::shared_ptr<const Block>> samples(boxes.size());
-    try {
-        passing_->resample(
-            Lattice::axisParallel(frame.originWorld, frame.rootSpacingWorld), boxes,
-            [&](std::size_t root, const Block& block) {
-                samples[root] = std::make_shared<const Block>(block);
-            },
-            execution.withoutProgress());
-    } catch (...) {
-        beginRoots();
-        throw;
-    }
+    passing_->resample(
+        Lattice::axisParallel(frame.originWorld, frame.rootSpacingWorld), boxes,
+        [&](std::size_t root, const Block& block) { samples[root] = std::make_shared<const Block>(block); },
+        execution.withoutProgress());
     for (std::size_t root = 0; root < samples.size(); ++root)
         memory_.add(MeshBricks::Number(root), std::move(samples[root]));
     counts_.sampled += std::int64_t(samples.size());
-    show(roots);
+    show(Change{});
 }
 
 void BrickScheduler::finish(const Execution& execution) {

@@ -112,7 +112,9 @@ class BrickScheduler {
     /// that it made, until a brick is sampled again. Plans anew.
     void setFindings(std::span<LeafFindings> findings);
     /// Of a leaf shown: the largest error found that counts, over its bound; 0 without errors.
-    double errorOverBound(const DepthKey& leaf) const { return plan_->errorOverBound(*bricks_.find(leaf)); }
+    double errorOverBound(const DepthKey& leaf) const {
+        return plan_ ? plan_->errorOverBound(*bricks_.find(leaf)) : 0;
+    }
     /// The budget holds fewer bricks than are wished for.
     bool isCutShort() const { return plan_ && plan_->isCutShort(); }
 
@@ -143,6 +145,7 @@ class BrickScheduler {
 
     bool workUntil(Clock::time_point deadline, const Execution& execution);
     void replan();
+    WishPlan& plan();
     void beginRoots();
     bool beginChange(const WishPlan::Split& split);
     bool fillQueue(Clock::time_point deadline);
@@ -172,10 +175,10 @@ class BrickScheduler {
     Wishes wishes_;
 
     GrowingTree tree_;
-    bool hasRoots_ = false;      ///< the coarsest bricks are shown
-    BrickMemory memory_;         ///< holds leaves and the bricks above them, and what changes wait for
-    std::vector<bool> isSplit_;  ///< by number: bricks above leaves; what lies beyond the end isn't
-    std::unique_ptr<WishPlan> plan_;
+    bool hasRoots_ = false;           ///< the coarsest bricks are shown
+    BrickMemory memory_;              ///< holds leaves and the bricks above them, and what changes wait for
+    std::vector<bool> isSplit_;       ///< by number: bricks above leaves; what lies beyond the end isn't
+    std::unique_ptr<WishPlan> plan_;  ///< null before the index is built
     int planNumber_ = 0;
     bool isAtRest_ = false;
     std::optional<WishPlan::Split> next_;          ///< of the plan, waiting for room

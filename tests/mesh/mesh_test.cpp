@@ -1,12 +1,16 @@
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <set>
 
 #include "brick_test_meshes.h"
 #include "mesh/element_index.h"
+#include "mesh/face_matching.h"
 #include "mesh/geometry.h"
 #include "mesh/mesh_quality.h"
 #include "mesh/nearest_point.h"
@@ -438,6 +442,34 @@ TEST(ShellEdges, AreThoseOfTheBoundaryOrOfItsBends) {
     touching.points = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 1, 0}, {-1, 0, 0}, {-1, -1, 0}};
     touching.tets = {{0, 1, 2, 3}, {0, 1, 4, 5}};
     EXPECT_EQ(shellEdges(touching, 180), (std::vector<ShellEdge>{{0, 1}}));
+}
+
+// Few nodes: faces have one, two, three elements and more, some of them flat, some twice the same.
+TEST(FaceMatching, BoundaryAloneIsThatOfAll) {
+    std::mt19937 random(11);
+    for (const int nodes : {5, 12, 40, 2000}) {
+        TetMesh mesh;
+        mesh.points.resize(std::size_t(nodes));
+        std::vector<std::uint8_t> flat;
+        for (int e = 0; e < 5000; ++e) {
+            std::array<std::int32_t, 4> tet{};
+            const int around = int(random() % unsigned(nodes));
+            for (std::size_t c = 0; c < 4; ++c) {
+                do tet[c] = (around + std::int32_t(random() % 5u)) % nodes;
+                while (std::find(tet.begin(), tet.begin() + std::ptrdiff_t(c), tet[c]) !=
+                       tet.begin() + std::ptrdiff_t(c));
+            }
+            mesh.tets.push_back(tet);
+            flat.push_back(random() % 10 == 0);
+        }
+        const std::vector<BoundaryFace> all = matchFaces(mesh, flat, {}).boundary;
+        const std::vector<BoundaryFace> alone = matchBoundary(mesh, flat, {.threads = 3});
+        ASSERT_EQ(alone.size(), all.size());
+        for (std::size_t f = 0; f < all.size(); ++f) {
+            EXPECT_EQ(alone[f].element, all[f].element);
+            EXPECT_EQ(alone[f].nodes, all[f].nodes);
+        }
+    }
 }
 
 }  // namespace
