@@ -146,11 +146,9 @@ class Extender {
             if (!boxes_[std::size_t(i)]) return;
             const int level = tree_.leaves()[std::size_t(i)].level;
             boxes_[std::size_t(i)]->forEachNeeded([&](const Vec3i& p) {
-                reconstruction_.visitSources(level, p,
-                                             [&](int ownerLevel, const Vec3i& point, bool isCovered) {
-                                                 if (!isCovered && kept_.keeps(ownerLevel, point))
-                                                     found[std::size_t(i)].push_back({ownerLevel, point});
-                                             });
+                reconstruction_.visitOutside(level, p, [&](int ownerLevel, const Vec3i& point) {
+                    if (kept_.keeps(ownerLevel, point)) found[std::size_t(i)].push_back({ownerLevel, point});
+                });
             });
         });
         boxes_.clear();

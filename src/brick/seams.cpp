@@ -48,11 +48,6 @@ Reconstruction::Owner Reconstruction::findOwner(int level, const Vec3i& p) const
     return {finer, finerLevel, p * (1 << (level - finerLevel)), false};
 }
 
-int Reconstruction::coarserLevelAt(int level, const Vec3i& p) const {
-    const Owner owner = findOwner(level, p);
-    return owner.isInterpolated ? owner.level : -1;
-}
-
 const Tile* Reconstruction::coveredTile(const Owner& owner) const {
     if (owner.leaf < 0) return nullptr;
     const int n = store_->tilesPerEdge();
@@ -108,15 +103,19 @@ PointSource Reconstruction::fromCoarse(int level, const Vec3i& p, int coarse, in
     return source;
 }
 
-void Reconstruction::visitSources(int level, const Vec3i& p, const VisitSource& visit) const {
+void Reconstruction::visitCorners(int level, const Vec3i& p, const VisitPoint& visit) const {
     const Owner owner = findOwner(level, p);
-    if (!owner.isInterpolated) {
-        visit(owner.level, owner.point, coveredTile(owner) != nullptr);
-        return;
-    }
+    if (!owner.isInterpolated) return visit(level, p);
     const auto [cell, t] = coarseCell(p, owner.level - level);
     for (int c = 0; c < 8; ++c)
-        if (cornerWeight(t, c) > 0) visitSources(owner.level, cell + cornerOffset(c), visit);
+        if (cornerWeight(t, c) > 0) visitCorners(owner.level, cell + cornerOffset(c), visit);
+}
+
+void Reconstruction::visitOutside(int level, const Vec3i& p, const VisitPoint& visit) const {
+    visitCorners(level, p, [&](int cornerLevel, const Vec3i& corner) {
+        const Owner owner = findOwner(cornerLevel, corner);
+        if (!coveredTile(owner)) visit(owner.level, owner.point);
+    });
 }
 
 void Reconstruction::nearestValues(int level, const Vec3i& p, int firstChannel,

@@ -95,12 +95,13 @@ class Reconstruction {
     bool isCovered(int level, const Vec3i& p) const {
         return resolve(level, p, 0, {}) == PointSource::covered;
     }
-    /// The level of the coarser leaf that a point is interpolated in; -1: it isn't.
-    int coarserLevelAt(int level, const Vec3i& p) const;
-    /// Calls visit(level, p, isCovered) for every point that the value at `p` depends on, as a point of the
-    /// leaf that owns it, or of the last level looked at when none does.
-    using VisitSource = std::function<void(int level, const Vec3i& p, bool isCovered)>;
-    void visitSources(int level, const Vec3i& p, const VisitSource& visit) const;
+    using VisitPoint = std::function<void(int level, const Vec3i& p)>;
+    /// Calls visit(level, p) for every point that the value at `p` is interpolated from, as a point of the
+    /// coarser leaf that it is interpolated in; for `p` itself where it isn't.
+    void visitCorners(int level, const Vec3i& p, const VisitPoint& visit) const;
+    /// The same for those outside the mesh, as points of the leaf that owns them, or of the last level looked
+    /// at when none does.
+    void visitOutside(int level, const Vec3i& p, const VisitPoint& visit) const;
     /// All channels at the mesh point nearest to lattice point `p`; NaN where a value isn't finite as a
     /// float, and for a mesh without elements.
     void nearestValues(int level, const Vec3i& p, int firstChannel, std::span<double> values) const;

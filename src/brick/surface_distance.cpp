@@ -9,6 +9,17 @@
 
 namespace tessera {
 
+namespace {
+
+/// The inverse of Block::offset().
+Vec3i pointAt(const IndexBox& box, std::uint32_t offset) {
+    const Vec3i size = box.size();
+    const int n = int(offset);
+    return box.min + Vec3i(n % size.x, n / size.x % size.y, n / (size.x * size.y));
+}
+
+}  // namespace
+
 std::vector<std::uint32_t> cornersAtSurface(const std::vector<std::uint8_t>& coverage, const Vec3i& size) {
     const auto isCovered = [](std::uint8_t covered) { return covered != 0; };
     if (std::all_of(coverage.begin(), coverage.end(), isCovered) ||
@@ -37,97 +48,54 @@ std::vector<std::uint32_t> cornersAtSurface(const std::vector<std::uint8_t>& cov
     return corners;
 }
 
-SurfacePoints measureSurface(const NearestPointIndex& nearest, const Lattice& lattice, const IndexBox& box,
+SurfacePoints measureSurface(const NearestOnDemand& nearest, const Lattice& lattice, const IndexBox& box,
                              const std::vector<std::uint8_t>& coverage) {
+    SurfacePoints points;
     const std::vector<std::uint32_t> corners = cornersAtSurface(coverage, box.size());
+    if (corners.empty()) return points;
     const double spacing = lattice.uWorld.x;
     // Between a corner in the mesh and one that isn't the surface lies, a cell's diagonal away at most. But
     // by the seam rule a corner may not be covered that is in the mesh.
     const double reach = 1.75 * spacing;
-    const Vec3i size = box.size();
     const std::vector<double> distances =
-        nearest.distances({lattice.originWorld, spacing, box.min, size}, corners, reach);
-    SurfacePoints points;
+        nearest.get().distances({lattice.originWorld, spacing, box.min, box.size()}, corners, reach);
     for (std::size_t i = 0; i < corners.size(); ++i) {
-        const int n = int(corners[i]);
-        const Vec3i p = box.min + Vec3i(n % size.x, n / size.x % size.y, n / (size.x * size.y));
-        const double distance =
-            distances[i] < reach ? distances[i] / spacing : distanceFromSurface(nearest, lattice, p);
+        const double distance = distances[i] < reach
+                                    ? distances[i] / spacing
+                                    : distanceFromSurface(nearest, lattice, pointAt(box, corners[i]));
         points.add(corners[i], coverage[corners[i]] != 0 ? distance : -distance);
     }
     return points;
 }
 
-double distanceFromSurface(const NearestPointIndex& nearest, const Lattice& lattice, const Vec3i& p) {
+double distanceFromSurface(const NearestOnDemand& nearest, const Lattice& lattice, const Vec3i& p) {
     const double spacing = lattice.uWorld.x;
-    const NearestPoint found = nearest.find(lattice.worldFromIndex(Vec3d(p)), kFarFromSurface * spacing);
+    const NearestPoint found =
+        nearest.get().find(lattice.worldFromIndex(Vec3d(p)), kFarFromSurface * spacing);
     return found.element < 0 ? kFarFromSurface : found.distanceWorld / spacing;
 }
 
-namespace {
-
-/// A level, a lattice point and its distance.
-struct Measured {
-    BrickKey point;
-    float distance;
-};
-
-/// Finds what the cells of leaves need.
-class SurfaceSearch {
-  public:
-    SurfaceSearch(const BrickTree& tree, const Reconstruction& reconstruction,
-                  const NearestPointIndex& nearest)
-        : tree_(tree), reconstruction_(reconstruction), nearest_(nearest) {}
-
-    std::vector<Measured> search(const BrickKey& leaf, const std::vector<std::uint8_t>& coverage) const {
-        const IndexBox box = tree_.closedPoints(leaf);
-        const Vec3i size = box.size();
-        const SurfacePoints points = measureSurface(nearest_, tree_.lattice(leaf.level), box, coverage);
-        std::vector<Measured> found;
-        for (const auto& [offset, distance] : points.all()) {
-            const int n = int(offset);
-            const Vec3i p = box.min + Vec3i(n % size.x, n / size.x % size.y, n / (size.x * size.y));
-            if (!addSources({leaf.level, p}, found)) found.push_back({{leaf.level, p}, distance});
-        }
-        return found;
-    }
-
-  private:
-    /// Of a point that is interpolated in a coarser leaf; false when it isn't.
-    bool addSources(const BrickKey& point, std::vector<Measured>& found) const {
-        const int coarse = reconstruction_.coarserLevelAt(point.level, point.index);
-        if (coarse < 0) return false;
-        const int step = 1 << (coarse - point.level);
-        const Vec3i cell = floorDiv(point.index, step);
-        const Vec3d t = Vec3d(point.index - cell * step) / double(step);
-        for (int c = 0; c < 8; ++c) {
-            const BrickKey corner{coarse, cell + cornerOffset(c)};
-            if (cornerWeight(t, c) > 0 && !addSources(corner, found))
-                found.push_back({corner, distanceOf(corner)});
-        }
-        return true;
-    }
-    float distanceOf(const BrickKey& point) const {
-        const double distance = distanceFromSurface(nearest_, tree_.lattice(point.level), point.index);
-        return float(reconstruction_.isCovered(point.level, point.index) ? distance : -distance);
-    }
-
-    const BrickTree& tree_;
-    const Reconstruction& reconstruction_;
-    const NearestPointIndex& nearest_;
-};
-
-}  // namespace
-
 void measureSurface(const BrickTree& tree, BrickStore& store, const Reconstruction& reconstruction,
-                    const NearestPointIndex& nearest, const KeptPoints& kept, const Execution& execution) {
+                    const NearestOnDemand& nearest, const KeptPoints& kept, const Execution& execution) {
+    struct Measured {
+        BrickKey point;  // a level and a lattice point
+        float distance;
+    };
     const ClosedCoverage coverage(tree, store, reconstruction, execution);
-    const SurfaceSearch search(tree, reconstruction, nearest);
     std::vector<std::vector<Measured>> found(tree.leafCount());
     parallelFor(execution, std::int64_t(tree.leafCount()), [&](std::int64_t i) {
         const auto leaf = std::size_t(i);
-        if (!coverage.isSurelyWhole(leaf))
-            found[leaf] = search.search(tree.leaves()[leaf], coverage.of(leaf));
+        if (coverage.isSurelyWhole(leaf)) return;
+        const int level = tree.leaves()[leaf].level;
+        const IndexBox box = tree.closedPoints(tree.leaves()[leaf]);
+        const SurfacePoints points = measureSurface(nearest, tree.lattice(level), box, coverage.of(leaf));
+        for (const auto& point : points.all())
+            reconstruction.visitCorners(level, pointAt(box, point.first), [&](int at, const Vec3i& corner) {
+                if (at == level) return found[leaf].push_back({{at, corner}, point.second});
+                const double distance = distanceFromSurface(nearest, tree.lattice(at), corner);
+                found[leaf].push_back(
+                    {{at, corner}, float(reconstruction.isCovered(at, corner) ? distance : -distance)});
+            });
     });
     store.surface().clear();
     for (const std::vector<Measured>& ofLeaf : found)

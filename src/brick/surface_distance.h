@@ -47,16 +47,16 @@ std::vector<std::uint32_t> cornersAtSurface(const std::vector<std::uint8_t>& cov
 
 /// How far a point is from the mesh's boundary, in voxels, at most kFarFromSurface.
 /// @param lattice axis-parallel, of one spacing.
-double distanceFromSurface(const NearestPointIndex& nearest, const Lattice& lattice, const Vec3i& p);
+double distanceFromSurface(const NearestOnDemand& nearest, const Lattice& lattice, const Vec3i& p);
 
 /// The signed distances of those points of a box. @param lattice axis-parallel, of one spacing.
-SurfacePoints measureSurface(const NearestPointIndex& nearest, const Lattice& lattice, const IndexBox& box,
+SurfacePoints measureSurface(const NearestOnDemand& nearest, const Lattice& lattice, const IndexBox& box,
                              const std::vector<std::uint8_t>& coverage);
 
 /// Gives the store the distances of all points that reading where the mesh ends needs: corners of cells at
 /// the surface, and where those lie on the border to a coarser leaf what they are interpolated from. What was
 /// there before goes. @param reconstruction of this tree and store. @param kept no other point gets one.
 void measureSurface(const BrickTree& tree, BrickStore& store, const Reconstruction& reconstruction,
-                    const NearestPointIndex& nearest, const KeptPoints& kept, const Execution& execution);
+                    const NearestOnDemand& nearest, const KeptPoints& kept, const Execution& execution);
 
 }  // namespace tessera

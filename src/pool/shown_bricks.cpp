@@ -126,10 +126,8 @@ bool ShownBricks::isOnBorder(const Vec3i& local) const {
 void ShownBricks::findOutside(Leaf& leaf) const {
     if (!mesh_) return;
     const Block& samples = *leaf.samples;
-    auto surface = std::make_shared<const SurfacePoints>();
-    if (samples.coverage.end() != std::find(samples.coverage.begin(), samples.coverage.end(), 0))
-        surface = std::make_shared<const SurfacePoints>(
-            measureSurface(nearest_->get(), samples.lattice, samples.box, samples.coverage));
+    auto surface = std::make_shared<const SurfacePoints>(
+        measureSurface(*nearest_, samples.lattice, samples.box, samples.coverage));
     auto corner = surface->all().begin();
     std::vector<double> values(channelOf_.size());
     NearestWalk walk(nearest_);
@@ -177,7 +175,7 @@ double ShownBricks::surfaceAt(const Leaf& leaf, const Vec3i& p, PointSource sour
     if (!leaf.surface) return isCovered ? 0.5 : -0.5;
     if (const float* known = leaf.surface->find(leaf.samples->offset(p))) return double(*known);
     if (!mesh_ || unknown == Unknown::far) return isCovered ? kFarFromSurface : -kFarFromSurface;
-    const double distance = distanceFromSurface(nearest_->get(), leaf.samples->lattice, p);
+    const double distance = distanceFromSurface(*nearest_, leaf.samples->lattice, p);
     return isCovered ? distance : -distance;
 }
 

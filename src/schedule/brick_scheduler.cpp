@@ -172,10 +172,10 @@ void BrickScheduler::setBudget(std::int64_t budgetBytes) {
 }
 
 void BrickScheduler::replan() {
-    const PlanLimit most = limit();
+    limit();  // throws before anything has changed
     plan_.reset();
     // Making a plan may build the index, which the coarsest bricks don't need.
-    if (index_->ifBuilt()) plan_ = std::make_unique<WishPlan>(bricks_, wishes_, most);
+    if (index_->ifBuilt()) plan();
     next_.reset();
     hasRanked_ = isAtRest_ = false;
     ++planNumber_;

@@ -106,7 +106,7 @@ void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::v
                 reconstruction.nearestValues(level, p, 0, values);
             },
             execution);
-        measureSurface(result.tree, result.store, reconstruction, nearest.get(), kept, execution);
+        measureSurface(result.tree, result.store, reconstruction, nearest, kept, execution);
     }
     bool isRounded = false;
     if (shape.halfFloat) {

@@ -166,7 +166,7 @@ class VoxelChecker {
     void compareSurface(const Reconstruction& reconstruction) {
         if (store_.surface().empty()) return;
         TileMap found = std::move(store_.surface());
-        measureSurface(tree_, store_, reconstruction, nearest_.get(), kept_, execution_);
+        measureSurface(tree_, store_, reconstruction, nearest_, kept_, execution_);
         comparePoints(
             store_.surface(), found,
             [&](int level, const Vec3i& p, const Tile& expected, const Tile& other, int offset) {

@@ -71,7 +71,7 @@ TEST(SurfaceDistance, OfASlopingPlaneIsLinearSoThatItsZeroIsThePlane) {
                 beside = glm::cross(normal, across);
     mesh.points = {6.0 * across, -3.0 * across + 5.0 * beside, -3.0 * across - 5.0 * beside, -9.0 * normal};
     mesh.tets = {{0, 1, 2, 3}};
-    const NearestPointIndex nearest(mesh);
+    const NearestOnDemand nearest(mesh, 1);
     const Lattice lattice = Lattice::axisParallel(Vec3d(0.03, 0.01, -0.02), 0.125);
     const IndexBox box{Vec3i(-4), Vec3i(5)};
     std::vector<std::uint8_t> coverage;

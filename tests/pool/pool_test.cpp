@@ -121,8 +121,7 @@ void extendEverywhere(const BrickTree& tree, const Reconstruction& reconstructio
     const auto channels = std::size_t(store.channels());
     TileMap extension;
     std::vector<double> values(channels);
-    const auto put = [&](int level, const Vec3i& p, bool isCovered) {
-        if (isCovered) return;
+    const auto put = [&](int level, const Vec3i& p) {
         Tile& tile = extension[{level, floorDiv(p, kTileSize)}];
         if (!tile.values) tile.values = std::make_unique<float[]>(channels * kTilePoints);
         const int offset = offsetInTile(p);
@@ -134,7 +133,7 @@ void extendEverywhere(const BrickTree& tree, const Reconstruction& reconstructio
     };
     for (const BrickKey& leaf : tree.leaves())
         forEachLocal([&](const Vec3i& local, std::size_t) {
-            reconstruction.visitSources(leaf.level, leaf.index * kCells + local, put);
+            reconstruction.visitOutside(leaf.level, leaf.index * kCells + local, put);
         });
     store.extension() = std::move(extension);
 }
