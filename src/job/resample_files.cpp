@@ -195,7 +195,7 @@ Json ResampleRun::runStep(const ResampleStep& step) {
     const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
     const StepPlan plan = planStep(file.mesh, request_);
-    checkOutputFields(plan.selection.outputs);
+    checkOutputFields(plan.selection.outputs, request_.shape.hasSurface());
     sayImport(step, file, plan);
     Json report = documentOf(step);
     const StepResult result =

@@ -96,7 +96,7 @@ void shapeForFile(const TetMesh& mesh, std::span<const int> fields, const std::v
         result.store = std::move(flat.store);
         result.flatLevel = plan.level;
         isCoarser = plan.isCapped;
-    } else if (shape.layers > 0) {
+    } else if (shape.hasSurface()) {
         const Reconstruction reconstruction(mesh, fields, result.tree, result.store, nearest);
         const KeptPoints kept(shape.boundsWorld, result.tree.originWorld(), result.tree.spacingWorld(),
                               result.tree.levelCount());

@@ -25,6 +25,9 @@ struct OutputShape {
     /// flat: bound on points; 0: 2^26, or none when the bricks have one level
     std::int64_t maxFlatVoxels = 0;
     std::int64_t maxFlatBytes = 0;  ///< flat: bound on the grids' memory; 0: a quarter of the machine's
+
+    /// The mesh's surface stands beside the fields.
+    bool hasSurface() const { return layout == VdbLayout::levels && layers > 0; }
 };
 
 /// The grid that the flat layout makes of some bricks.

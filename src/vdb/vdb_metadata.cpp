@@ -194,8 +194,9 @@ std::string gridName(const std::string& base, VdbLayout layout, int level) {
     return layout == VdbLayout::flat ? base : base + "_level_" + std::to_string(level);
 }
 
-void checkOutputFields(const std::vector<OutputField>& fields) {
-    std::set<std::string> names{"coverage", "surface"};
+void checkOutputFields(const std::vector<OutputField>& fields, bool hasSurface) {
+    std::set<std::string> names{"coverage"};
+    if (hasSurface) names.insert("surface");
     for (const GridPlan& grid : planGrids(fields)) {
         if (grid.name.empty())
             throw InputError("a grid needs a name: give the field another with --field name=newname");

@@ -12,9 +12,9 @@ namespace tessera {
 
 inline constexpr int kVdbFormat = 1;  ///< raised when an older reader could no longer read the file
 
-/// Throws InputError when two grids would get the same name, or a field the name of the coverage mask. Call
-/// it before long work.
-void checkOutputFields(const std::vector<OutputField>& fields);
+/// Throws InputError when two grids would get the same name, or a field the name of the coverage mask or of
+/// the mesh's surface, where that stands beside them. Call it before long work.
+void checkOutputFields(const std::vector<OutputField>& fields, bool hasSurface = false);
 
 /// One value grid a level: a scalar, or the three components of a vector.
 struct GridPlan {

@@ -338,7 +338,7 @@ void readLevelGrids(openvdb::io::File& source, int level, VdbFile& file) {
             readExtension(*grid, level, file, put);
         }
     }
-    readSurface(source, level, file);
+    if (file.layout == VdbLayout::levels && file.layers > 0) readSurface(source, level, file);
 }
 
 // Adds the bricks that hold an active point of a grid.

@@ -541,7 +541,7 @@ std::optional<BrickStatistics> statisticsOf(const std::vector<OutputField>& fiel
 openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm form, BrickResult& result,
                               const VdbWriteOptions& options, VdbWriteResult& written,
                               const Execution& execution) {
-    checkOutputFields(fields);
+    checkOutputFields(fields, !result.store.surface().empty());
     TESSERA_CHECK((options.layout == VdbLayout::flat) == result.bricks.has_value(),
                   "a flat grid is made by flatten");
     chooseUnit(result.tree, options, written);

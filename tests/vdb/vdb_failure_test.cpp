@@ -20,6 +20,8 @@ TEST_F(VdbFailureTest, NamesThatWouldClashAreRefused) {
     EXPECT_THROW(checkOutputFields({{"coverage", "a", "point", 1, 0}}), InputError);
     EXPECT_THROW(checkOutputFields({{"a", "a", "point", 1, 0}, {"a", "b", "point", 3, 1}}), InputError);
     EXPECT_THROW(checkOutputFields({{"S", "a", "point", 2, 0}, {"S_1", "b", "point", 1, 2}}), InputError);
+    EXPECT_THROW(checkOutputFields({{"surface", "a", "point", 1, 0}}, true), InputError);
+    EXPECT_NO_THROW(checkOutputFields({{"surface", "a", "point", 1, 0}}, false));
     EXPECT_THROW(checkOutputFields({{"", "a", "point", 1, 0}}), InputError);
     EXPECT_NO_THROW(checkOutputFields(kMixed));
 }
