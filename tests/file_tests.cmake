@@ -6,6 +6,12 @@ if(TESSERA_BUILD_IO)
   if(TESSERA_SANITIZE MATCHES undefined)
     target_compile_options(vdb_test PRIVATE -fno-sanitize=undefined)  # as in src/vdb
   endif()
+  tessera_test(isolated_vdb_test FOLDER vdb LINK reader PRIVATE_LINK tessera_openvdb)
+  target_compile_definitions(isolated_vdb_test PRIVATE TESSERA_MISBEHAVING_READER="$<TARGET_FILE:misbehaving_reader>")
+  add_dependencies(isolated_vdb_test misbehaving_reader)
+  if(TESSERA_SANITIZE MATCHES undefined)
+    target_compile_options(isolated_vdb_test PRIVATE -fno-sanitize=undefined)  # as in src/vdb
+  endif()
   tessera_test(vdb_metadata_test FOLDER vdb LINK vdb)
   tessera_test(stored_bricks_test FOLDER pool OPTIMISED LINK pool vdb software)
   tessera_test(pool_data_test FOLDER pool OPTIMISED LINK pool reader software)

@@ -42,8 +42,6 @@ int runResample(const ResampleArguments& a) {
 
 int runInfo(const InfoArguments& a) {
     DescribeRequest request = a.request;
-    if (request.paths.size() == 1 && isVdbName(request.paths[0]))
-        refuseReaderBounds(a.common.reader, request.paths[0] + " is no mesh");
     request.repair = repairOptions(a.repair);
     Session session(a.common);
     session.writeReport(describeFiles(request, session.job));
@@ -70,7 +68,6 @@ int runTets(const TetsArguments& a) {
 
 int runPicture(const PictureArguments& a) {
     DrawRequest request = a.request;
-    if (request.mesh.empty()) refuseReaderBounds(a.common.reader, "without --mesh there is none to be read");
     request.axis = a.axis == "x" ? 0 : a.axis == "y" ? 1 : 2;
     if (!a.bounds.empty()) request.boundsWorld = parseBounds(a.bounds);
     if (!a.range.empty()) request.range = parseRange("--range", a.range);
@@ -82,7 +79,6 @@ int runPicture(const PictureArguments& a) {
 int runRender(const RenderArguments& a) {
     RenderRequest request = a.request;
     request.input = a.frames.inputs.front();
-    if (isVdbName(request.input)) refuseReaderBounds(a.common.reader, request.input + " is no mesh");
     if (!a.size.empty()) request.size = parsePictureSize("--size", a.size);
     if (!a.gl.empty()) request.platform = parseGlPlatform(a.gl);
     Session session(a.common, request.output);

@@ -15,7 +15,7 @@
 #include "interrupt.h"
 #include "job/wrap_text.h"
 #include "progress.h"
-#include "reader/serve_mesh_reader.h"
+#include "reader/isolated_vdb.h"
 #include "session.h"
 #include "tessera/error.h"
 
@@ -27,7 +27,7 @@ constexpr int kExitBadInput = 2;
 /// One line on standard error, whatever the message holds. Where it can't be written the exit code has to do.
 void printError(const char* message) {
     const auto pause = tessera::pauseProgress();
-    std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
+    std::fputs(("tessera: " + tessera::messageLine(tessera::singleLine(message)) + "\n").c_str(), stderr);
 }
 
 /// What is printed must never reach a file that happens to get the number of a closed stream: such streams
@@ -52,10 +52,12 @@ int run(const tessera::CommandLine& line) {
     return 0;
 }
 
-/// What the process that reads a mesh runs; another tessera process is its only user.
-int readMeshForParent(const std::vector<std::string>& words) {
+/// What the process that reads a file runs; another tessera process is its only user.
+int readForParent(const std::vector<std::string>& words) {
     try {
-        return tessera::serveMeshReader(words);
+        std::vector<tessera::ReaderTask> tasks = tessera::vdbTasks();
+        tasks.push_back(tessera::meshTask());
+        return tessera::serveReader(words, tasks);
     } catch (const tessera::InputError& error) {
         printError(error.what());
         return kExitBadInput;
@@ -85,7 +87,7 @@ int readMeshForParent(const std::vector<std::string>& words) {
 
 int main(int argc, char** argv) {
     if (argc > 1 && std::string(argv[1]) == tessera::kReadMeshCommand)
-        _exit(readMeshForParent({argv + 2, argv + argc}));
+        _exit(readForParent({argv + 2, argv + argc}));
     holdClosedStreams();
     tessera::noteStart();
     tessera::installInterruptHandlers();

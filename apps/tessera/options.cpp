@@ -190,11 +190,6 @@ VdbLayout chooseLayout(const ResampleArguments& a, const OutputFormat& format) {
 
 }  // namespace
 
-void refuseReaderBounds(const ReaderArguments& a, const std::string& why) {
-    require(!a.maxSeconds, "--max-read-time bounds the reading of a mesh: " + why);
-    require(a.maxMemory.empty(), "--max-memory bounds the reading of a mesh here: " + why);
-}
-
 BindOptions bindOptions(const AlgorithmArguments& a) {
     BindOptions options;
     options.target = a.gl;

@@ -65,10 +65,6 @@ struct ResampleArguments {
     ResampleRequest request;
 };
 
-/// For commands that were given no mesh to read: throws InputError when there are bounds on reading one.
-/// @param why "out.vdb is no mesh".
-void refuseReaderBounds(const ReaderArguments& arguments, const std::string& why);
-
 BindOptions bindOptions(const AlgorithmArguments& arguments);
 /// None without --repair. Throws InputError for values out of range.
 std::optional<RepairOptions> repairOptions(const RepairArguments& arguments);

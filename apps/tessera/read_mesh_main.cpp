@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "reader/isolated_reader.h"
-#include "reader/serve_mesh_reader.h"
+#include "reader/serve_reader.h"
 
 int main(int argc, char** argv) {
     try {
         const std::vector<std::string> request(argv + std::min(argc, 1), argv + argc);
-        const int code = tessera::serveMeshReader(request, tessera::readCommonMesh);
+        const std::vector<tessera::ReaderTask> tasks{tessera::meshTask(tessera::readCommonMesh)};
+        const int code = tessera::serveReader(request, tasks);
         ::_exit(code);  // libraries have nothing to tidy up
     } catch (const std::exception& error) {
         std::fprintf(stderr, "tessera_read_mesh: %s\n", error.what());

@@ -12,8 +12,8 @@
 #include "job/repair_report.h"
 #include "job/report_text.h"
 #include "job/series_steps.h"
+#include "job/vdb_contents.h"
 #include "tessera/error.h"
-#include "vdb/vdb_read.h"
 
 namespace tessera {
 
@@ -122,7 +122,7 @@ void addVdb(Json& json, const VdbFile& file) {
 }
 
 Json showVdb(const std::string& path, Job& job) {
-    const VdbFile file = readVdb(path);
+    const VdbFile file = openVdb(path, VdbContents::withoutValues, job);
     job.say(vdbText(path, file, job.textWidth));
     if (job.reportPath.empty()) return {};
     Json json = head({path});

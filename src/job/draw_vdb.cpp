@@ -16,7 +16,6 @@
 #include "tessera/error.h"
 #include "tessera/registry.h"
 #include "vdb/vdb_file.h"
-#include "vdb/vdb_read.h"
 
 namespace tessera {
 
@@ -103,7 +102,7 @@ DrawnSlice drawVdb(const DrawRequest& request, Job& job) {
                      {{"--output", request.output}, {"--json", job.reportPath}});
     chooseFormat(request.output, {}, {"png"});
     checkWritable(request.output);
-    const VdbFile file = readVdb(request.input);
+    const VdbFile file = openVdb(request.input, VdbContents::all, job);
     const OutputField& field = chooseField(file, request.field);
     SliceOptions slice = sliceOptions(request, file);
     const OutsideFields outside = readOutside(request, file, job);

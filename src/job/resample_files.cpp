@@ -14,12 +14,12 @@
 #include "job/report_text.h"
 #include "job/resample_step.h"
 #include "job/series_steps.h"
+#include "job/vdb_contents.h"
 #include "refine/plan.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
 #include "vdb/vdb_metadata.h"
-#include "vdb/vdb_read.h"
 
 namespace tessera {
 
@@ -122,7 +122,7 @@ Json ResampleRun::run() {
 }
 
 void ResampleRun::takeLattice() {
-    request_.refine.frame = readVdbLattice(request_.like);
+    request_.refine.frame = openVdbLattice(request_.like, job_);
     // The file's spacing is the finest; what the caller gave beside it would contradict it.
     if (request_.refine.resolution > 0 || request_.refine.spacingWorld > 0)
         throw InputError("--like sets the spacing: --resolution and --spacing can't be given with it");

@@ -2,9 +2,21 @@
 
 #include <fmt/format.h>
 
+#include "reader/isolated_vdb.h"
 #include "tessera/error.h"
+#include "vdb/vdb_read.h"
 
 namespace tessera {
+
+VdbFile openVdb(const std::string& path, VdbContents contents, const Job& job) {
+    if (!job.reader) return readVdb(path);
+    return readVdbIsolated(*job.reader, path, contents, job.readerLimits, job.execution);
+}
+
+FixedFrame openVdbLattice(const std::string& path, const Job& job) {
+    if (!job.reader) return readVdbLattice(path);
+    return readVdbLatticeIsolated(*job.reader, path, job.readerLimits, job.execution);
+}
 
 Box3d coveredBounds(const VdbFile& file) {
     Box3d bounds;

@@ -2,10 +2,18 @@
 
 #include <string>
 
+#include "job/job.h"
+#include "reader/vdb_packet.h"
+#include "refine/refine_options.h"
 #include "tessera/vec.h"
 #include "vdb/vdb_file.h"
 
 namespace tessera {
+
+/// Reads a .vdb file, in a process of its own where the job has one. Throws as readVdb does.
+VdbFile openVdb(const std::string& path, VdbContents contents, const Job& job);
+/// The same of readVdbLattice.
+FixedFrame openVdbLattice(const std::string& path, const Job& job);
 
 /// Box of the covered lattice points; empty when there is none.
 Box3d coveredBounds(const VdbFile& file);

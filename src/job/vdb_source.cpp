@@ -12,7 +12,6 @@
 #include "pool/pool_target.h"
 #include "pool/stored_bricks.h"
 #include "tessera/error.h"
-#include "vdb/vdb_read.h"
 
 namespace tessera {
 
@@ -167,7 +166,7 @@ class VdbSource : public PictureSource {
 
 std::unique_ptr<PictureSource> openVdbSource(const std::string& path, const std::string& field,
                                              std::optional<int> component, GlThread& thread, Job& job) {
-    VdbFile file = readVdb(path);
+    VdbFile file = openVdb(path, VdbContents::all, job);
     const OutputField shown = chooseField(file, field);
     titleOf(shown, component);
     try {

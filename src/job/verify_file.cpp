@@ -11,11 +11,12 @@
 #include "job/output_paths.h"
 #include "job/repair_report.h"
 #include "job/report_text.h"
+#include "job/vdb_contents.h"
 #include "mesh_files/mesh_series.h"
+#include "reader/isolated_vdb.h"
 #include "refine/measure_error.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
-#include "vdb/vdb_read.h"
 #include "vdb/vdb_write.h"
 
 namespace tessera {
@@ -247,7 +248,7 @@ Verification verifyFile(const VerifyRequest& request, Job& job) {
         throw InputError(request.meshPath +
                          " is given as the mesh: the mesh comes first, then the .vdb file");
     job.execution.declare({{Stage::reading, 1}, {Stage::measuring, 1}, {Stage::comparing, 1}});
-    VdbFile file = readVdb(request.vdbPath);
+    VdbFile file = openVdb(request.vdbPath, VdbContents::all, job);
     ReadOptions options;
     options.timeStep = stepOf(request, file);
     for (const OutputField& output : file.fields) options.fields.push_back(output.sourceName);
@@ -276,7 +277,9 @@ Verification verifyFile(const VerifyRequest& request, Job& job) {
     v.voxels = check(mesh, fields, file, job.execution);
     v.strayValues = file.strayValues;
     v.gridProblems = file.gridProblems;
-    v.reading = readAsOutsider(request.vdbPath, file, mesh, fields, job.execution);
+    const GridSampler sampler =
+        job.reader ? isolatedGridSampler(*job.reader, job.readerLimits, job.execution) : sampleGrids;
+    v.reading = readAsOutsider(request.vdbPath, file, mesh, fields, sampler, job.execution);
     if (isFlat && file.layers == 0) {  // nothing is promised then, and the report counts the gaps
         v.reading.incomplete = 0;
         v.reading.firstProblem.clear();

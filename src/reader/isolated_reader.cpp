@@ -1,6 +1,7 @@
 #include "reader/isolated_reader.h"
 
 #include <poll.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,7 +20,6 @@
 #include "reader/mesh_packet.h"
 #include "reader/reader_limits.h"
 #include "reader/reader_process.h"
-#include "reader/reader_report.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -27,7 +27,7 @@ namespace tessera {
 namespace {
 
 constexpr int kTickMs = 50;
-constexpr std::uint64_t kLongestMessage = 1 << 20;
+constexpr const char* kSuspicion = "; the file is damaged, or hits a bug of the library that reads it";
 
 std::string inMiB(std::int64_t bytes) {
     return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB";
@@ -39,35 +39,34 @@ std::string inSeconds(double seconds) {
     return text;
 }
 
-/// One reading by a child: its report arrives piece by piece.
+/// One request and its answer: the request goes and the report arrives piece by piece.
 class IsolatedReading {
   public:
     /// @param given as the caller gave them: 0 for the usual ones.
-    IsolatedReading(const std::string& path, const ReadOptions& options, const IsolationLimits& given,
+    IsolatedReading(ReaderRequest request, std::string name, const IsolationLimits& given,
                     const Execution& execution)
-        : path_(path),
-          options_(options),
-          name_(meshName(path, options)),
-          given_(given),
-          usual_(defaultLimits(path, options.otherParts)),
-          limits_(usual_),
-          execution_(execution) {
-        if (given.memoryBytes > 0) limits_.memoryBytes = given.memoryBytes;
-        if (given.seconds > 0) {
-            limits_.seconds = given.seconds;
-            limits_.processorSeconds = std::numeric_limits<double>::infinity();
-        }
-        if (given.processorSeconds > 0) limits_.processorSeconds = given.processorSeconds;
+        : request_(std::move(request)), name_(std::move(name)), given_(given), execution_(execution) {
+        request_.parent = ::getpid();
+        request_.memoryBytes = given.memoryBytes;
+        request_.threads = execution.threads;
+        HeadWriter words;
+        words.put(requestWords(request_));
+        const std::string text = words.take();
+        words.put(std::uint64_t(text.size()));
+        sent_ = words.take() + text;
     }
 
-    MeshFile run(const IsolatedReader& reader);
+    using Take = std::function<void(std::span<const std::byte>)>;
+    void run(const IsolatedReader& reader, const Take& take);
 
   private:
-    MeshFile takeMesh(ReaderProcess& process);
-    std::optional<MeshFile> readQuickly(const std::string& executable,
-                                        const std::vector<std::string>& request);
+    void setLimits(const IsolationLimits& usual);
+    void takeLimits(const ReaderProcess& process);
+    void takeAnswer(ReaderProcess& process, const Take& take);
+    bool readQuickly(const std::string& executable, const Take& take);
     bool awaitReport(ReaderProcess& process);
     void checkTimes(double spentMs, const ReaderProcess& process) const;
+    void send(int descriptor);
     bool receive(int descriptor);
     bool isComplete() const;
     ReportStart start() const;
@@ -75,13 +74,25 @@ class IsolatedReading {
     [[noreturn]] void failWithGarbage(const std::string& why) const;
     [[noreturn]] void failWithEnd(const ProcessEnd& end) const;
 
-    const std::string& path_;
-    const ReadOptions& options_;
+    ReaderRequest request_;
     std::string name_;  // for messages
+    std::string sent_;  // the request
+    std::size_t sentBytes_ = 0;
     IsolationLimits given_, usual_, limits_;
     const Execution& execution_;
     std::vector<std::byte> report_;
 };
+
+/// What was given counts.
+void IsolatedReading::setLimits(const IsolationLimits& usual) {
+    limits_ = usual_ = usual;
+    if (given_.memoryBytes > 0) limits_.memoryBytes = given_.memoryBytes;
+    if (given_.seconds > 0) {
+        limits_.seconds = given_.seconds;
+        limits_.processorSeconds = std::numeric_limits<double>::infinity();
+    }
+    if (given_.processorSeconds > 0) limits_.processorSeconds = given_.processorSeconds;
+}
 
 ReportStart IsolatedReading::start() const {
     ReportStart start;
@@ -90,33 +101,48 @@ ReportStart IsolatedReading::start() const {
 }
 
 void IsolatedReading::failWithGarbage(const std::string& why) const {
-    throw InputError(name_ + ": the reader went wrong and handed over no sound mesh (" + why +
-                     "); the file is damaged, or hits a bug of the library that reads it");
+    throw InputError(name_ + ": the reader went wrong and handed over no sound " +
+                     (request_.task == "mesh" ? "mesh" : "answer") + " (" + why + ")" + kSuspicion);
 }
 
 void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
-    throw InputError(name_ + ": the reader " + end.words +
-                     "; the file is damaged, or hits a bug of the library that reads it");
+    throw InputError(name_ + ": the reader " + end.words + kSuspicion);
 }
 
 bool IsolatedReading::isComplete() const {
     if (report_.size() < sizeof(ReportStart)) return false;
     const ReportStart s = start();
     const std::uint64_t most =
-        s.outcome == ReaderOutcome::meshFollows ? std::uint64_t(limits_.memoryBytes) : kLongestMessage;
+        s.outcome == ReaderOutcome::answerFollows ? std::uint64_t(limits_.memoryBytes) : kLongestMessageBytes;
     if (s.magic != ReportStart::kMagic || s.outcome > ReaderOutcome::outOfMemory || s.bytes > most ||
         report_.size() - sizeof s > s.bytes)
         failWithGarbage("its report makes no sense");
     return report_.size() - sizeof s == s.bytes;
 }
 
-/// Takes what there is in the pipe. False when the child has closed it.
+/// Gives what fits into the socket. A child that ended early is noticed by what it reports.
+void IsolatedReading::send(int descriptor) {
+    while (sentBytes_ < sent_.size()) {
+        const ssize_t count =
+            ::send(descriptor, sent_.data() + sentBytes_, sent_.size() - sentBytes_, MSG_NOSIGNAL);
+        if (count < 0 && errno == EINTR) continue;
+        if (count < 0 && errno != EAGAIN) sentBytes_ = sent_.size();
+        if (count < 0) return;
+        sentBytes_ += std::size_t(count);
+    }
+}
+
+/// Takes what there is in the socket. False when the child has closed it.
 bool IsolatedReading::receive(int descriptor) {
     std::array<std::byte, 1 << 16> buffer;
     while (!isComplete()) {
-        const ssize_t count = ::read(descriptor, buffer.data(), buffer.size());
+        // No more than is missing: another report may follow.
+        const std::size_t missing = report_.size() < sizeof(ReportStart)
+                                        ? sizeof(ReportStart) - report_.size()
+                                        : sizeof(ReportStart) + start().bytes - report_.size();
+        const ssize_t count = ::read(descriptor, buffer.data(), std::min(buffer.size(), missing));
         if (count < 0 && errno == EINTR) continue;
-        if (count < 0) return true;
+        if (count < 0) return errno == EAGAIN;
         if (count == 0) return false;
         report_.insert(report_.end(), buffer.begin(), buffer.begin() + count);
     }
@@ -137,21 +163,42 @@ void IsolatedReading::checkTimes(double spentMs, const ReaderProcess& process) c
                          (given_.processorSeconds > 0 ? ", the limit given" : usual));
 }
 
+/// The usual limits for this file, which the child has looked at by now. A wrong word of it is worth no more
+/// than a file that declares as much.
+void IsolatedReading::takeLimits(const ReaderProcess& process) {
+    IsolationLimits usual;
+    if (report_.size() != sizeof(ReportStart) + sizeof usual) failWithGarbage("its limits make no sense");
+    std::memcpy(&usual, report_.data() + sizeof(ReportStart), sizeof usual);
+    if (!(usual.memoryBytes > 0 && usual.seconds > 0 && usual.processorSeconds > 0))
+        failWithGarbage("its limits make no sense");
+    setLimits(usual);
+    limits_.memoryBytes = std::min(limits_.memoryBytes, std::max(given_.memoryBytes, mostMemoryBytes()));
+    if (given_.processorSeconds <= 0) limits_.processorSeconds += process.processorSeconds();
+    report_.clear();
+}
+
 /// False when the child closed its end before its report was whole.
 bool IsolatedReading::awaitReport(ReaderProcess& process) {
+    setLimits(limitsToLook());
     report_.clear();
+    sentBytes_ = 0;
     double spentMs = 0;
     Timer timer;
     while (true) {
         execution_.throwIfCancelled();
+        send(process.reports());
         const bool open = receive(process.reports());
+        if (isComplete() && start().outcome == ReaderOutcome::limits) {
+            takeLimits(process);
+            continue;
+        }
         if (isComplete()) return true;
         if (!open) return false;
         // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the reader's.
         spentMs += std::min(timer.restart(), 5.0 * kTickMs);
         checkTimes(spentMs, process);
         const double leftMs = limits_.seconds * 1e3 - spentMs;
-        pollfd reports{process.reports(), POLLIN, 0};
+        pollfd reports{process.reports(), short(POLLIN | (sentBytes_ < sent_.size() ? POLLOUT : 0)), 0};
         ::poll(&reports, 1, int(std::ceil(std::min(leftMs, double(kTickMs)))));
     }
 }
@@ -178,57 +225,46 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
     }
 }
 
-/// The mesh, or the error, of a report that is whole.
-MeshFile IsolatedReading::takeMesh(ReaderProcess& process) {
+/// The answer, or the error, of a report that is whole.
+void IsolatedReading::takeAnswer(ReaderProcess& process, const Take& take) {
     const ReportStart answer = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
-    const std::int64_t heldBytes = residentMemoryBytes();
-    const auto unpack = [&](std::span<const std::byte> packet) {
-        MeshFile file = readPacket(packet, execution_);
-        file.readPeakBytes += heldBytes;
-        return file;
-    };
     try {
-        if (answer.outcome == ReaderOutcome::meshFollows) return unpack(rest);
-        if (answer.outcome == ReaderOutcome::meshInMemory)
-            return unpack(SealedMemory(process.mesh()).bytes());
+        if (answer.outcome == ReaderOutcome::answerFollows) return take(rest);
+        if (answer.outcome == ReaderOutcome::answerInMemory)
+            return take(SealedMemory(process.answer(), limits_.memoryBytes).bytes());
     } catch (const DamagedPacket& damage) {
         failWithGarbage(damage.what());
     }
-    rethrow(answer.outcome, {reinterpret_cast<const char*>(rest.data()), rest.size()});
+    rethrow(answer.outcome, messageLine({reinterpret_cast<const char*>(rest.data()), rest.size()}));
 }
 
-/// Nothing when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks
-/// a library.
-std::optional<MeshFile> IsolatedReading::readQuickly(const std::string& executable,
-                                                     const std::vector<std::string>& request) {
+/// False when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks a
+/// library.
+bool IsolatedReading::readQuickly(const std::string& executable, const Take& take) {
     std::optional<ReaderProcess> process;
     try {
-        process.emplace(executable, request);
+        process.emplace(executable, startWords(request_.parent));
     } catch (const IoError&) {
-        return std::nullopt;
+        return false;
     }
     if (!awaitReport(*process)) {
         const ProcessEnd end = process->describeEnd();
         if (end.bySignal) failWithEnd(end);
-        return std::nullopt;
+        return false;
     }
-    if (start().outcome == ReaderOutcome::otherFormat) return std::nullopt;
-    return takeMesh(*process);
+    if (start().outcome == ReaderOutcome::otherFormat) return false;
+    takeAnswer(*process, take);
+    return true;
 }
 
-MeshFile IsolatedReading::run(const IsolatedReader& reader) {
-    const std::vector<std::string> request =
-        requestWords({::getpid(), limits_.memoryBytes, execution_.threads, path_, options_});
-    if (!reader.quickExecutable.empty()) {
-        if (std::optional<MeshFile> mesh = readQuickly(reader.quickExecutable, request))
-            return *std::move(mesh);
-    }
+void IsolatedReading::run(const IsolatedReader& reader, const Take& take) {
+    if (!reader.quickExecutable.empty() && readQuickly(reader.quickExecutable, take)) return;
     std::vector<std::string> words = reader.arguments;
-    words.insert(words.end(), request.begin(), request.end());
+    for (std::string& word : startWords(request_.parent)) words.push_back(std::move(word));
     ReaderProcess process(reader.executable, words);
     if (!awaitReport(process)) failWithEnd(process.describeEnd());
-    return takeMesh(process);
+    takeAnswer(process, take);
 }
 
 }  // namespace
@@ -245,10 +281,26 @@ std::string quickReaderBeside(const std::string& executable) {
     return {};
 }
 
+void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
+               const IsolationLimits& limits, const Execution& execution,
+               const std::function<void(std::span<const std::byte>)>& take) {
+    execution.throwIfCancelled();
+    IsolatedReading(std::move(request), name, limits, execution).run(reader, take);
+}
+
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
                           const IsolationLimits& limits, const Execution& execution) {
-    execution.throwIfCancelled();
-    return IsolatedReading(path, options, limits, execution).run(reader);
+    ReaderRequest request;
+    request.path = path;
+    request.options = options;
+    MeshFile file;
+    askReader(reader, std::move(request), meshName(path, options), limits, execution,
+              [&](std::span<const std::byte> packet) {
+                  const std::int64_t heldBytes = residentMemoryBytes();
+                  file = unpackMesh(packet, execution);
+                  file.readPeakBytes += heldBytes;
+              });
+    return file;
 }
 
 }  // namespace tessera

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <functional>
 #include <span>
 #include <string>
@@ -8,6 +8,7 @@
 
 #include "mesh_files/read_mesh.h"
 #include "reader/reader_limits.h"
+#include "reader/reader_report.h"
 
 namespace tessera {
 
@@ -25,10 +26,17 @@ struct IsolatedReader {
 /// The built or installed tessera_read_mesh that belongs to a tessera program; empty when there is none.
 std::string quickReaderBeside(const std::string& executable);
 
-/// readMesh in a process of its own, which takes crashes, endless loops and endless demands for memory with
-/// it: they become an InputError that names the file and what happened. Errors, warnings and the mesh are
-/// those of readMesh, bit for bit. The mesh comes back through memory that both share, and is checked. Throws
-/// IoError when the process can't be started, std::bad_alloc when this one's own address space is too small.
+/// Has a process of its own do a task, which takes crashes, endless loops and endless demands for memory with
+/// it: they become an InputError that begins with `name` and says what happened. Its errors keep their type
+/// and words. The answer comes through memory that both share, sealed.
+/// @param request parent and memoryBytes are filled in here. @param take is called once with the answer's
+/// packet, and throws DamagedPacket where that isn't sound. Throws IoError when the process can't be started,
+/// std::bad_alloc when this one's own address space is too small.
+void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
+               const IsolationLimits& limits, const Execution& execution,
+               const std::function<void(std::span<const std::byte>)>& take);
+
+/// readMesh by askReader. Errors, warnings and the mesh are those of readMesh, bit for bit.
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,
                           const IsolationLimits& limits, const Execution& execution);
 

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <limits>
 
 #include "files/input_file.h"
 #include "mesh_files/ensight_check.h"
 #include "mesh_files/legacy_check.h"
 #include "mesh_files/xml_check.h"
-#include "reader/isolated_reader.h"
 
 namespace tessera {
 
@@ -20,9 +20,12 @@ namespace {
 // element; a grid's point becomes five or six elements. The factors leave room for meshes that compress
 // better.
 constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytesPerItem = 700;
+// OpenVDB needs a dozen bytes for a byte of file, and 40 where all values are the same.
+constexpr double kVdbFloorBytes = 192.0 * (1 << 20);
 constexpr double kFloorSeconds = 3, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
 // Others may have the processors, and disks may be slow.
 constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
+constexpr double kLookSeconds = 20;
 // Below, a file's own word on its cells is worth nothing: its size alone bounds what it may take.
 constexpr std::int64_t kSmallFile = 8 << 20;
 constexpr int kMostFiles = 100000;
@@ -74,7 +77,28 @@ InputSize sizeOfInput(const std::string& path) {
     return {double(file.size()), 0};
 }
 
+IsolationLimits limitsFor(const InputSize& size, double floorBytes) {
+    IsolationLimits limits;
+    limits.memoryBytes = std::int64_t(
+        std::min(floorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items),
+                 double(mostMemoryBytes())));
+    limits.processorSeconds =
+        kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
+    limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
+    return limits;
+}
+
 }  // namespace
+
+std::int64_t mostMemoryBytes() {
+    const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
+    if (pages <= 0 || pageBytes <= 0) return std::numeric_limits<std::int64_t>::max();
+    return std::int64_t(pages) * pageBytes / 4 * 3;
+}
+
+IsolationLimits limitsToLook() {
+    return {std::int64_t(kFloorBytes), kFloorWaitSeconds, kLookSeconds};
+}
 
 IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts) {
     InputSize size = sizeOfInput(path);
@@ -83,15 +107,11 @@ IsolationLimits defaultLimits(const std::string& path, std::span<const std::stri
         size.bytes += more.bytes;
         size.items += more.items;
     }
-    IsolationLimits limits;
-    double bytes = kFloorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items);
-    const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
-    if (pages > 0 && pageBytes > 0) bytes = std::min(bytes, 0.75 * double(pages) * double(pageBytes));
-    limits.memoryBytes = std::int64_t(bytes);
-    limits.processorSeconds =
-        kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
-    limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
-    return limits;
+    return limitsFor(size, kFloorBytes);
+}
+
+IsolationLimits limitsOfVdb(const std::string& path) {
+    return limitsFor({double(InputFile(path).size()), 0}, kVdbFloorBytes);
 }
 
 }  // namespace tessera

@@ -15,11 +15,20 @@ struct IsolationLimits {
     double processorSeconds = 0;  ///< of all its threads together; no bound where only `seconds` is given
 };
 
+/// Three quarters of the memory here.
+std::int64_t mostMemoryBytes();
+
+/// Bounds on looking at a file before its usual limits are known.
+IsolationLimits limitsToLook();
+
 /// Bounds for a mesh of this size on disk, its other parts and companion files included, each once: 640 MiB
 /// and 96 bytes a byte of file, at most three quarters of the memory here; 3 s of processor time and a second
 /// for every 4 MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells
 /// in fewer bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK
 /// file declares. Throws InputError when the file is missing, empty or damaged at first sight.
 IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts = {});
+
+/// Bounds for a VDB file: 192 MiB and 96 bytes a byte of file, and times as for meshes.
+IsolationLimits limitsOfVdb(const std::string& path);
 
 }  // namespace tessera

@@ -5,6 +5,7 @@
 #include <spawn.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <time.h>
@@ -19,7 +20,7 @@
 #include <thread>
 #include <utility>
 
-#include "reader/mesh_packet.h"
+#include "reader/packet.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -32,7 +33,7 @@ constexpr int kEndMs = 2000;
 constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
 
 [[noreturn]] void failToStart(const std::string& what, int error) {
-    std::string line = "can't start the process that reads meshes: " + what + ": " + std::strerror(error);
+    std::string line = "can't start the process that reads files: " + what + ": " + std::strerror(error);
     rlimit files{};
     if (error == EMFILE && ::getrlimit(RLIMIT_NOFILE, &files) == 0)
         line += ": at most " + std::to_string(files.rlim_cur) + " are allowed here (ulimit -n), " +
@@ -80,15 +81,15 @@ class ReaderEnvironment {
 /// What posix_spawn does in the child.
 class SpawnPlan {
   public:
-    SpawnPlan(const Descriptor& reports, const Descriptor& mesh) {
+    SpawnPlan(const Descriptor& reports, const Descriptor& answer) {
         posix_spawn_file_actions_init(&actions_);
         posix_spawnattr_init(&attributes_);
         int error = 0;
         for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
             error |= posix_spawn_file_actions_addopen(&actions_, stream, "/dev/null", O_RDWR, 0);
         error |= posix_spawn_file_actions_adddup2(&actions_, reports.get(), kReportDescriptor);
-        error |= posix_spawn_file_actions_adddup2(&actions_, mesh.get(), kMeshDescriptor);
-        error |= posix_spawn_file_actions_addclosefrom_np(&actions_, kMeshDescriptor + 1);
+        error |= posix_spawn_file_actions_adddup2(&actions_, answer.get(), kAnswerDescriptor);
+        error |= posix_spawn_file_actions_addclosefrom_np(&actions_, kAnswerDescriptor + 1);
         const sigset_t blocked = maskOfChild();
         error |= posix_spawnattr_setsigmask(&attributes_, &blocked);
         error |= posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
@@ -144,12 +145,13 @@ void Descriptor::close() {
     number_ = -1;
 }
 
-SealedMemory::SealedMemory(int descriptor) {
+SealedMemory::SealedMemory(int descriptor, std::int64_t mostBytes) {
     ::fcntl(descriptor, F_ADD_SEALS, kSeals);
     const int seals = ::fcntl(descriptor, F_GET_SEALS);
     struct stat status {};
     if (seals < 0 || (seals & kSeals) != kSeals || ::fstat(descriptor, &status) != 0)
         throw DamagedPacket("its memory can't be sealed");
+    if (status.st_size > mostBytes) throw DamagedPacket("it is larger than the limit");
     if (status.st_size == 0) return;
     const auto size = std::size_t(status.st_size);
     void* memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, descriptor, 0);
@@ -163,21 +165,21 @@ SealedMemory::~SealedMemory() {
 
 void ReaderProcess::open() {
     int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) failToStart("pipe", errno);
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) failToStart("socket", errno);
     reports_ = Descriptor(ends[0]);
     childReports_ = Descriptor(ends[1]);
-    if (::fcntl(reports_.get(), F_SETFL, O_NONBLOCK) != 0) failToStart("pipe", errno);
-    mesh_ = Descriptor(::memfd_create("tessera-mesh", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-    if (mesh_.get() < 0) failToStart("shared memory", errno);
+    if (::fcntl(reports_.get(), F_SETFL, O_NONBLOCK) != 0) failToStart("socket", errno);
+    answer_ = Descriptor(::memfd_create("tessera-answer", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    if (answer_.get() < 0) failToStart("shared memory", errno);
     childReports_ = spareCopy(childReports_);
-    childMesh_ = spareCopy(mesh_);
+    childAnswer_ = spareCopy(answer_);
 }
 
 ReaderProcess::ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments) {
     open();
-    child_ = SpawnPlan(childReports_, childMesh_).spawn(executable, arguments);
+    child_ = SpawnPlan(childReports_, childAnswer_).spawn(executable, arguments);
     childReports_.close();
-    childMesh_.close();
+    childAnswer_.close();
 }
 
 ReaderProcess::~ReaderProcess() {

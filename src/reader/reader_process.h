@@ -11,8 +11,8 @@
 namespace tessera {
 
 /// Descriptors that a reader's process finds open.
-constexpr int kReportDescriptor = 3;  ///< a pipe to its parent
-constexpr int kMeshDescriptor = 4;    ///< an empty file in memory (memfd) for the mesh
+constexpr int kReportDescriptor = 3;  ///< a socket to its parent: the request comes, reports go
+constexpr int kAnswerDescriptor = 4;  ///< an empty file in memory (memfd) for the answer
 
 /// A file descriptor that closes itself.
 class Descriptor {
@@ -32,8 +32,8 @@ class Descriptor {
 class SealedMemory {
   public:
     /// Seals the file's size and content, then maps it. Throws DamagedPacket when somebody can still write to
-    /// it.
-    explicit SealedMemory(int descriptor);
+    /// it, or it is larger than that.
+    SealedMemory(int descriptor, std::int64_t mostBytes);
     ~SealedMemory();
     SealedMemory(const SealedMemory&) = delete;
     SealedMemory& operator=(const SealedMemory&) = delete;
@@ -60,7 +60,7 @@ class ReaderProcess {
     ReaderProcess& operator=(const ReaderProcess&) = delete;
 
     int reports() const { return reports_.get(); }  ///< never blocks
-    int mesh() const { return mesh_.get(); }
+    int answer() const { return answer_.get(); }
     /// Processor time that the child has taken so far, of all its threads; 0 when it has ended.
     double processorSeconds() const;
     /// Says how a child ended that closed its reports: "crashed (signal 11, Segmentation fault)", "ended
@@ -71,8 +71,8 @@ class ReaderProcess {
     void kill();
     void open();
 
-    Descriptor childReports_, childMesh_;  // until the child has them
-    Descriptor reports_, mesh_;
+    Descriptor childReports_, childAnswer_;  // until the child has them
+    Descriptor reports_, answer_;
     pid_t child_ = -1;
 };
 

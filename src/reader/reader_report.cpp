@@ -1,5 +1,6 @@
 #include "reader/reader_report.h"
 
+#include <algorithm>
 #include <charconv>
 
 #include "tessera/error.h"
@@ -8,10 +9,10 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kFixedWords = 7;
+constexpr std::size_t kFixedWords = 9;
 // The other program may be of another build: what they say to each other has a number, to be raised with each
 // change.
-constexpr const char* kProtocol = TESSERA_VERSION "/3";
+constexpr const char* kProtocol = TESSERA_VERSION "/4";
 constexpr const char* kByItself = "the reader of meshes is started by tessera itself";
 
 template <class Number>
@@ -25,6 +26,29 @@ Number parseNumber(const std::string& word) {
 
 }  // namespace
 
+std::string messageLine(std::string text) {
+    if (text.size() > kLongestMessageBytes) {
+        const auto isInCharacter = [&](std::size_t at) { return (text[at] & 0xc0) == 0x80; };
+        std::size_t front = kLongestMessageBytes / 2, back = text.size() - kLongestMessageBytes / 2 + 3;
+        while (front > 0 && isInCharacter(front)) --front;
+        while (back < text.size() && isInCharacter(back)) ++back;
+        text = text.substr(0, front) + "..." + text.substr(back);
+    }
+    for (char& c : text)
+        if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+    return text;
+}
+
+std::vector<std::string> startWords(std::int64_t parent) {
+    return {kProtocol, std::to_string(parent)};
+}
+
+std::int64_t parseStart(std::span<const std::string> words) {
+    if (words.size() != 2 || words[0] != kProtocol)
+        throw InputError(std::string(kByItself) + ", of the same version");
+    return parseNumber<std::int64_t>(words[1]);
+}
+
 std::vector<std::string> requestWords(const ReaderRequest& request) {
     static_assert(sizeof(ReadOptions) == 2 * sizeof(std::vector<std::string>) + 8,
                   "a new member of ReadOptions needs its word here and in parseRequest");
@@ -34,7 +58,9 @@ std::vector<std::string> requestWords(const ReaderRequest& request) {
                                    std::to_string(request.threads),
                                    std::to_string(request.options.timeStep),
                                    std::to_string(request.options.otherParts.size()),
-                                   request.path};
+                                   request.path,
+                                   request.task,
+                                   request.body};
     words.insert(words.end(), request.options.otherParts.begin(), request.options.otherParts.end());
     words.insert(words.end(), request.options.fields.begin(), request.options.fields.end());
     return words;
@@ -50,6 +76,8 @@ ReaderRequest parseRequest(std::span<const std::string> words) {
     request.options.timeStep = parseNumber<int>(words[4]);
     const auto parts = parseNumber<std::size_t>(words[5]);
     request.path = words[6];
+    request.task = words[7];
+    request.body = words[8];
     const std::span<const std::string> rest = words.subspan(kFixedWords);
     if (parts > rest.size()) throw InputError(std::string(kByItself) + "; a part has no name");
     request.options.otherParts.assign(rest.begin(), rest.begin() + std::ptrdiff_t(parts));

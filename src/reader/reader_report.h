@@ -1,17 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "reader/isolated_reader.h"
+#include "mesh_files/read_mesh.h"
+#include "reader/reader_limits.h"
 
 namespace tessera {
 
-/// How reading ended, as the reading process reports it.
+/// What the reading process has to say, mostly how reading ended.
 enum class ReaderOutcome : std::uint32_t {
-    meshInMemory,  ///< the mesh's packet is in the shared memory
-    meshFollows,   ///< it follows in the pipe, where a limit on file sizes forbids the shared memory
+    limits,          ///< usual IsolationLimits for this file follow; then it reads
+    answerInMemory,  ///< the answer's packet is in the shared memory
+    answerFollows,   ///< it follows in the socket, where a limit on file sizes forbids the shared memory
     /// the file has a format that this program doesn't read; a message follows, also for the ones below
     otherFormat,
     inputError,
@@ -22,7 +25,7 @@ enum class ReaderOutcome : std::uint32_t {
     outOfMemory,  ///< the memory that the parent itself may use was reached
 };
 
-/// Stands before the message or the mesh in the pipe.
+/// Stands before the message or the answer in the socket.
 struct ReportStart {
     static constexpr std::uint32_t kMagic = 0x54737373;
     std::uint32_t magic = kMagic;
@@ -30,14 +33,27 @@ struct ReportStart {
     std::uint64_t bytes = 0;  ///< that follow
 };
 
-/// What the reading process needs to know; as words, the arguments of its program.
+/// The longest message of a reading process, in bytes: with what a program puts before it a line of 1000.
+inline constexpr std::size_t kLongestMessageBytes = 980;
+/// The text as one line of at most so many bytes, without control characters: what a file holds may be in it.
+/// A longer one loses its middle.
+std::string messageLine(std::string text);
+
+/// What the reading process needs to know.
 struct ReaderRequest {
-    std::int64_t parent = 0;  ///< process that waits for the answer
-    std::int64_t memoryBytes = 0;
+    std::int64_t parent = 0;       ///< process that waits for the answer
+    std::int64_t memoryBytes = 0;  ///< it may take; 0: the usual limit
     int threads = 0;
     std::string path;
     ReadOptions options;
+    std::string task = "mesh";  ///< ReaderTask::name
+    std::string body{};         ///< what a task needs to know beyond that
 };
+
+/// Of the process that is started: the protocol and its parent. The rest comes through the socket.
+std::vector<std::string> startWords(std::int64_t parent);
+/// Its parent. Throws InputError when nothing else started it.
+std::int64_t parseStart(std::span<const std::string> words);
 
 std::vector<std::string> requestWords(const ReaderRequest& request);
 /// Throws InputError.

@@ -1,11 +1,7 @@
 #include "vdb/outside_reader.h"
 
-#include <openvdb/io/File.h>
-#include <openvdb/tools/Interpolation.h>
-
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "base/parallel.h"
 #include "base/text.h"
@@ -18,61 +14,38 @@ namespace tessera {
 namespace {
 
 constexpr std::int64_t kChunk = 4096;
-constexpr double kOnPlane = 0x1p-20;  // voxels: what rounding in the transform may move a place by
-
-// Whether the eight voxels around an index are active, but for those without weight.
-// @param rounding how far the transform moved it from its place, in voxels.
-template <class Accessor>
-bool isComplete(const Accessor& accessor, const openvdb::Vec3d& index, double rounding) {
-    const double onPlane = std::max(kOnPlane, 2 * rounding);
-    openvdb::Vec3d base;
-    openvdb::Vec3d fraction;
-    for (int a = 0; a < 3; ++a) {
-        const double whole = std::round(index[a]);
-        base[a] = std::abs(index[a] - whole) < onPlane ? whole : std::floor(index[a]);
-        fraction[a] = std::max(0.0, index[a] - base[a]);
-        if (fraction[a] < onPlane) fraction[a] = 0;
-    }
-    for (int c = 0; c < 8; ++c) {
-        if (((c & 1) && fraction[0] == 0) || ((c & 2) && fraction[1] == 0) || ((c & 4) && fraction[2] == 0))
-            continue;
-        const openvdb::Coord at(int(base[0]) + (c & 1), int(base[1]) + (c >> 1 & 1), int(base[2]) + (c >> 2));
-        if (!accessor.isValueOn(at)) return false;
-    }
-    return true;
-}
 
 class OutsideReader {
   public:
-    OutsideReader(const std::string& path, const VdbFile& file, const TetMesh& mesh,
-                  std::span<const int> fields, const Execution& execution)
-        : path_(path), file_(file), samples_(mesh, fields, execution), execution_(execution) {}
+    OutsideReader(const VdbFile& file, const TetMesh& mesh, std::span<const int> fields,
+                  const Execution& execution)
+        : file_(file), samples_(mesh, fields, execution), execution_(execution) {}
 
-    OutsideReading run() {
+    OutsideReading run(const std::string& path, const GridSampler& sampler) {
         findPlaces();
         OutsideReading reading;
-        for (const std::int32_t level : level_) reading.places += level >= 0;
-        openvdb::initialize();
-        openvdb::io::File source(path_);
-        source.open(/*delayLoad=*/false);
-        std::size_t f = 0;
-        for (const OutputField& field : file_.fields) {
-            squares_.assign(level_.size(), 0.0);
-            movedSquares_.assign(level_.size(), 0.0);
-            for (const GridPlan& plan : planGrids({field})) {
-                for (int level = 0; level < file_.tree.levelCount(); ++level) {
-                    const std::string name = gridName(plan.name, file_.layout, level);
-                    if (!source.hasGrid(name)) continue;
-                    const openvdb::GridBase::Ptr grid = source.readGrid(name);
-                    if (plan.components == 3)
-                        read(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid), f, plan, level, reading);
-                    else
-                        read(*openvdb::gridPtrCast<openvdb::FloatGrid>(grid), f, plan, level, reading);
-                }
-            }
+        for (const std::vector<std::size_t>& level : samplesOfLevel_)
+            reading.places += std::int64_t(level.size());
+        for (std::size_t f = 0; f < file_.fields.size(); ++f) {
+            squares_.assign(samples_.count(), 0.0);
+            movedSquares_.assign(samples_.count(), 0.0);
+            const std::vector<GridPlan> plans = planGrids({file_.fields[f]});
+            std::vector<GridQuestion> questions;
+            for (const GridPlan& plan : plans)
+                for (std::size_t level = 0; level < places_.size(); ++level)
+                    if (!places_[level].empty())
+                        questions.push_back(
+                            {gridName(plan.name, file_.layout, int(level)), plan.components, level});
+            const std::vector<std::vector<GridReading>> answers = sampler(path, places_, questions);
+            std::size_t q = 0;
+            for (const GridPlan& plan : plans)
+                for (std::size_t level = 0; level < places_.size(); ++level)
+                    if (!places_[level].empty()) {
+                        add(f, plan, questions[q], answers[q], reading);
+                        ++q;
+                    }
             reading.max.push_back(largestRoot(squares_));
             reading.rounding.push_back(largestRoot(movedSquares_));
-            ++f;
         }
         reading.incomplete = std::count(incomplete_.begin(), incomplete_.end(), std::uint8_t(1));
         return reading;
@@ -87,10 +60,13 @@ class OutsideReader {
 
     // Where the transform would place a sample in the grid of its level if it were exact. A turned grid has
     // turned places, not indices.
-    openvdb::Vec3d exactIndex(std::size_t sample, int level) const {
-        const Vec3d index = samples_.placeWorld(sample, file_.tree.originWorld()) /
-                            file_.tree.spacingWorld() * std::ldexp(1.0, -level);
-        return {index.x, index.y, index.z};
+    Vec3d exactIndex(std::size_t sample, int level) const {
+        return samples_.placeWorld(sample, file_.tree.originWorld()) / file_.tree.spacingWorld() *
+               std::ldexp(1.0, -level);
+    }
+    // Where the grids of a level have a sample, in units of the mesh.
+    Vec3d shiftedWorld(std::size_t sample, std::size_t level) const {
+        return samples_.placeWorld(sample, Vec3d(0)) + file_.voxelShift * file_.tree.spacingWorld(int(level));
     }
 
     void findPlaces() {
@@ -99,14 +75,24 @@ class OutsideReader {
         std::vector<std::uint8_t> coarserNear(tree.leafCount());
         for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf)
             coarserNear[leaf] = hasCoarserNeighbour(tree, leaf);
-        level_.assign(samples_.count(), -1);
+        std::vector<std::int32_t> levels(samples_.count(), -1);
         incomplete_.assign(samples_.count(), 0);
         parallelForChunks(execution_, std::int64_t(samples_.count()), kChunk,
                           [&](std::int64_t begin, std::int64_t end) {
                               for (std::int64_t i = begin; i < end; ++i)
                                   if (exact.exists(std::size_t(i)))
-                                      level_[std::size_t(i)] = levelOf(std::size_t(i), coarserNear);
+                                      levels[std::size_t(i)] = levelOf(std::size_t(i), coarserNear);
                           });
+        samplesOfLevel_.resize(std::size_t(std::max(tree.levelCount(), 1)));
+        for (std::size_t i = 0; i < levels.size(); ++i)
+            if (levels[i] >= 0) samplesOfLevel_[std::size_t(levels[i])].push_back(i);
+        places_.resize(samplesOfLevel_.size());
+        for (std::size_t level = 0; level < places_.size(); ++level)
+            for (const std::size_t i : samplesOfLevel_[level]) {
+                const Vec3d world = turned(shiftedWorld(i, level) * file_.unitScale, file_.upAxis);
+                const Vec3d index = exactIndex(i, int(level));
+                places_[level].push_back({{world.x, world.y, world.z}, {index.x, index.y, index.z}});
+            }
     }
 
     std::int32_t levelOf(std::size_t sample, const std::vector<std::uint8_t>& coarserNear) const {
@@ -134,63 +120,42 @@ class OutsideReader {
         return key.level;
     }
 
-    template <class Grid>
-    void read(const Grid& grid, std::size_t f, const GridPlan& plan, int level, OutsideReading& reading) {
-        std::mutex mutex;
+    void add(std::size_t f, const GridPlan& plan, const GridQuestion& question,
+             const std::vector<GridReading>& answer, OutsideReading& reading) {
         const SampledField& field = samples_.fields()[f];
         // Where a field has values that aren't finite, so may the voxels around have none.
         const bool isFinite = std::all_of(field.field->values.begin(), field.field->values.end(),
                                           [](double value) { return std::isfinite(float(value)); });
-        const double shift = file_.voxelShift * file_.tree.spacingWorld(level);
-        parallelForChunks(
-            execution_, std::int64_t(level_.size()), kChunk, [&](std::int64_t begin, std::int64_t end) {
-                const auto accessor = grid.getConstAccessor();
-                for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
-                    if (level_[i] != level || (field.isCell() && i < samples_.nodeCount())) continue;
-                    const Vec3d world = samples_.placeWorld(i, Vec3d(0)) + shift;
-                    const Vec3d place = world * file_.unitScale;
-                    const openvdb::Vec3d index = grid.transform().worldToIndex(
-                        turned(openvdb::Vec3d(place.x, place.y, place.z), file_.upAxis));
-                    const openvdb::Vec3d exact = exactIndex(i, level);
-                    const double moved = (index - exact).length();
-                    if (!isComplete(accessor, index, moved)) {
-                        squares_[i] = -1;
-                        if (!isFinite) continue;
-                        incomplete_[i] = 1;
-                        const std::lock_guard lock(mutex);
-                        if (reading.firstProblem.empty())
-                            reading.firstProblem = "the place (" + exactText(world.x) + ", " +
-                                                   exactText(world.y) + ", " + exactText(world.z) +
-                                                   ") lacks voxels around it in grid " + grid.getName();
-                        continue;
-                    }
-                    typename Grid::ValueType value;
-                    openvdb::tools::BoxSampler::sample(accessor, index, value);
-                    add(i, field, plan, value);
-                    if (moved <= kOnPlane) continue;
-                    typename Grid::ValueType there;
-                    openvdb::tools::BoxSampler::sample(accessor, exact, there);
-                    addMoved(i, value, there);
-                }
-            });
+        const int first = plan.firstChannel - file_.fields[f].firstChannel;
+        for (std::size_t k = 0; k < answer.size(); ++k) {
+            const std::size_t i = samplesOfLevel_[question.places][k];
+            if (field.isCell() && i < samples_.nodeCount()) continue;
+            if (answer[k].isComplete == 0) {
+                squares_[i] = -1;
+                if (!isFinite) continue;
+                incomplete_[i] = 1;
+                if (!reading.firstProblem.empty()) continue;
+                const Vec3d world = shiftedWorld(i, question.places);
+                reading.firstProblem = "the place (" + exactText(world.x) + ", " + exactText(world.y) + ", " +
+                                       exactText(world.z) + ") lacks voxels around it in grid " +
+                                       question.grid;
+                continue;
+            }
+            const Vec3d value = inMeshAxes(answer[k].value, plan);
+            const Vec3d there = inMeshAxes(answer[k].atExactIndex, plan);
+            for (int c = 0; c < plan.components; ++c) {
+                addComponent(i, field, first + c, value[c]);
+                if (const double moved = value[c] - there[c]; std::isfinite(moved))
+                    movedSquares_[i] += moved * moved;
+            }
+        }
     }
 
-    void add(std::size_t i, const SampledField& field, const GridPlan& plan, float value) {
-        const int c =
-            plan.firstChannel - file_.fields[std::size_t(&field - samples_.fields().data())].firstChannel;
-        addComponent(i, field, c, double(value));
+    Vec3d inMeshAxes(const std::array<float, 3>& value, const GridPlan& plan) const {
+        const Vec3d v{double(value[0]), double(value[1]), double(value[2])};
+        return plan.components == 3 ? turnedBack(v, file_.upAxis) : v;
     }
-    void add(std::size_t i, const SampledField& field, const GridPlan&, const openvdb::Vec3f& value) {
-        const openvdb::Vec3f v = turnedBack(value, file_.upAxis);
-        for (int c = 0; c < 3; ++c) addComponent(i, field, c, double(v[c]));
-    }
-    void addMoved(std::size_t i, float value, float exact) {
-        const double difference = double(value) - double(exact);
-        if (std::isfinite(difference)) movedSquares_[i] += difference * difference;
-    }
-    void addMoved(std::size_t i, const openvdb::Vec3f& value, const openvdb::Vec3f& exact) {
-        for (int c = 0; c < 3; ++c) addMoved(i, value[c], exact[c]);
-    }
+
     void addComponent(std::size_t i, const SampledField& field, int component, double value) {
         if (squares_[i] < 0) return;
         const double difference = value - samples_.exactValue(i, *field.field, component);
@@ -200,12 +165,12 @@ class OutsideReader {
             squares_[i] = -1;
     }
 
-    const std::string& path_;
     const VdbFile& file_;
     SampledMesh samples_;
     const Execution& execution_;
-    std::vector<std::int32_t> level_;       // by sample: the level whose grid it is read from, or -1
-    std::vector<std::uint8_t> incomplete_;  // by sample: it lacks a voxel in some grid
+    std::vector<std::vector<std::size_t>> samplesOfLevel_;  // those that are read from its grids
+    std::vector<std::vector<GridPlace>> places_;            // of these
+    std::vector<std::uint8_t> incomplete_;                  // by sample: it lacks a voxel in some grid
     std::vector<double> squares_;  // by sample: of the differences of one field; below 0 where not finite
     std::vector<double> movedSquares_;  // by sample: of what the transform's rounding changes of one field
 };
@@ -213,8 +178,9 @@ class OutsideReader {
 }  // namespace
 
 OutsideReading readAsOutsider(const std::string& path, const VdbFile& file, const TetMesh& mesh,
-                              std::span<const int> fields, const Execution& execution) {
-    return OutsideReader(path, file, mesh, fields, execution).run();
+                              std::span<const int> fields, const GridSampler& sampler,
+                              const Execution& execution) {
+    return OutsideReader(file, mesh, fields, execution).run(path, sampler);
 }
 
 }  // namespace tessera

@@ -7,6 +7,7 @@
 
 #include "tessera/execution.h"
 #include "tessera/mesh.h"
+#include "vdb/sample_grids.h"
 #include "vdb/vdb_file.h"
 
 namespace tessera {
@@ -23,7 +24,9 @@ struct OutsideReading {
 /// Reads the grids at every node and centroid of the mesh inside the file's bounds: of a flat file at all,
 /// of the levels at those whose cell lies inside one brick. Places without a finite value don't count.
 /// @param file what readVdb gave for `path`. @param fields indices into mesh.fields, as the file's fields.
+/// @param sampler sampleGrids, here or elsewhere.
 OutsideReading readAsOutsider(const std::string& path, const VdbFile& file, const TetMesh& mesh,
-                              std::span<const int> fields, const Execution& execution);
+                              std::span<const int> fields, const GridSampler& sampler,
+                              const Execution& execution);
 
 }  // namespace tessera

@@ -1,18 +1,11 @@
 #include "vdb/vdb_read.h"
 
 #include <openvdb/io/File.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <new>
 #include <string_view>
@@ -20,10 +13,12 @@
 #include <utility>
 
 #include "base/floor_div.h"
-#include "base/sanitizers.h"
 #include "base/text.h"
 #include "brick/surface_distance.h"
 #include "files/file_digest.h"
+#include "files/input_file.h"
+#include "files/file_digest.h"
+#include "files/input_file.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
 #include "vdb/openvdb_grids.h"
@@ -39,89 +34,32 @@ constexpr std::array<char, 8> kMagic{' ', 'B', 'D', 'V', 0, 0, 0, 0};
     throw InputError(path + ": " + why);
 }
 
-// Whether the bytes are those that a Tessera wrote. Throws when they claim to be but aren't.
-bool checkBytes(const std::string& path) {
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) refuse(path, std::string("can't open it: ") + std::strerror(errno));
-    std::vector<char> bytes(std::size_t(1) << 20);
-    stream.read(bytes.data(), std::streamsize(bytes.size()));
-    std::size_t got = std::size_t(stream.gcount());
-    if (got == 0) refuse(path, "the file is empty, or not a file");
-    if (std::string_view(bytes.data(), got).starts_with("NanoVDB"))
-        refuse(path, "is a NanoVDB file; tessera reads .vdb files");
-    if (got < kHeaderBytes || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
+// Throws when the bytes claim to be those that a Tessera wrote but aren't: that tells damage, and says
+// nothing of whether they are safe to read.
+void checkBytes(const std::string& path) {
+    InputFile file(path);
+    std::string head(file.bytesFrom(0, kHeaderBytes).substr(0, kHeaderBytes));
+    if (head.starts_with("NanoVDB")) refuse(path, "is a NanoVDB file; tessera reads .vdb files");
+    if (head.size() < kHeaderBytes || std::memcmp(head.data(), kMagic.data(), kMagic.size()) != 0)
         refuse(path, "not a VDB file");
-    const std::string uuid(bytes.data() + kUuidOffset, kUuidBytes);
-    if (!isDigestUuid(uuid)) return false;
-    std::memset(bytes.data() + kUuidOffset, '0', kUuidBytes);
+    const std::string uuid = head.substr(kUuidOffset);
+    if (!isDigestUuid(uuid)) return;
+    head.replace(kUuidOffset, kUuidBytes, kUuidBytes, '0');
     FileDigest digest;
-    while (got > 0) {
-        digest.update(bytes.data(), got);
-        stream.read(bytes.data(), std::streamsize(bytes.size()));
-        got = std::size_t(stream.gcount());
+    digest.update(head.data(), head.size());
+    for (std::size_t at = head.size(); at < file.size();) {
+        const std::string_view piece = file.bytesFrom(at);
+        digest.update(piece.data(), piece.size());
+        at += piece.size();
     }
     if (digest.uuid() != uuid)
         refuse(path, "the file is damaged or incomplete: its bytes don't match its digest");
-    return true;
-}
-
-// Address space in use now, in bytes.
-[[maybe_unused]] std::uint64_t addressSpaceBytes() {
-    std::ifstream status("/proc/self/statm");
-    std::uint64_t pages = 0;
-    status >> pages;
-    return pages * std::uint64_t(::sysconf(_SC_PAGESIZE));
-}
-
-// What a read may take at most, for a file of this size: more means that a damaged length is believed.
-void limitReader(std::uint64_t fileBytes) {
-    const rlimit noCore{0, 0};
-    ::setrlimit(RLIMIT_CORE, &noCore);
-    const rlim_t seconds = 10 + rlim_t(fileBytes >> 20);
-    const rlimit cpu{seconds, seconds};
-    ::setrlimit(RLIMIT_CPU, &cpu);
-#ifndef TESSERA_ADDRESS_SANITIZER  // it reserves terabytes itself
-    const rlim_t bytes = rlim_t(addressSpaceBytes() + (std::uint64_t(256) << 20) + 64 * fileBytes);
-    const rlimit memory{bytes, bytes};
-    ::setrlimit(RLIMIT_AS, &memory);
-#endif
-    for (int signal : {SIGSEGV, SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGXCPU}) ::signal(signal, SIG_DFL);
-}
-
-// OpenVDB trusts what it reads, so a damaged file can end the process or fill the memory. A file that no
-// digest vouches for is read in a child first, which may die.
-template <class Read>
-void tryInChild(const std::string& path, const Read& read) {
-    const std::uint64_t fileBytes = std::filesystem::file_size(path);
-    const pid_t child = ::fork();
-    if (child < 0)
-        throw IoError(std::string("can't start a process to check ") + path + ": " + std::strerror(errno));
-    if (child == 0) {
-        limitReader(fileBytes);
-        // These exceptions the parent gets again when it reads, and tells better.
-        try {
-            read();
-        } catch (const openvdb::Exception&) {
-        } catch (const InputError&) {
-        } catch (...) {
-            ::_exit(1);
-        }
-        ::_exit(0);
-    }
-    int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-    refuse(path, "the file is damaged: " +
-                     (WIFEXITED(status)
-                          ? std::string("a length in it is impossible")
-                          : "OpenVDB ends with signal " + std::to_string(WTERMSIG(status)) + " on it"));
 }
 
 template <class Read>
 auto guarded(const std::string& path, const Read& read) {
     try {
-        if (!checkBytes(path)) tryInChild(path, read);
+        checkBytes(path);
         return read();
     } catch (const openvdb::Exception& error) {
         refuse(path, std::string("OpenVDB can't read it: ") + error.what());
@@ -130,6 +68,8 @@ auto guarded(const std::string& path, const Read& read) {
     } catch (const IoError&) {
         throw;
     } catch (const InternalError&) {
+        throw;
+    } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
         refuse(path, std::string("the file is damaged: ") + error.what());

@@ -7,6 +7,7 @@
 
 namespace tessera {
 
+/// OpenVDB believes what it reads, so a damaged file can end this process: programs call readVdbIsolated.
 /// Throws InputError when the file is missing, damaged, no VDB file, or not written by Tessera
 /// (`readVdbLattice` takes any VDB file). Points that are covered but not valid come back as NaN in all
 /// components of the field.

@@ -21,7 +21,7 @@
 #include "reader/mesh_packet.h"
 #include "reader/reader_limits.h"
 #include "reader/reader_report.h"
-#include "reader/serve_mesh_reader.h"
+#include "reader/serve_reader.h"
 #include "tessera/error.h"
 #include "vtu_text.h"
 
@@ -330,6 +330,10 @@ TEST_F(IsolatedReaderTest, ARequestOfAnotherVersionIsRefused) {
     std::vector<std::string> words = requestWords({1, 2, 3, "mesh.vtu", {}});
     words[0] += "0";
     EXPECT_THROW(parseRequest(words), InputError);
+    words = startWords(1);
+    EXPECT_EQ(parseStart(words), 1);
+    words[0] += "0";
+    EXPECT_THROW(parseStart(words), InputError);
 }
 
 TEST_F(IsolatedReaderTest, AQuickProgramIsFoundBesideTessera) {
@@ -434,12 +438,12 @@ TEST_F(IsolatedReaderTest, SeveralThreadsReadAtOnce) {
 }
 
 TEST(ServeMeshReader, RefusesToRunWithoutItsParent) {
-    EXPECT_THROW(serveMeshReader(std::vector<std::string>{}), InputError);
-    EXPECT_THROW(serveMeshReader(std::vector<std::string>{"1", "2", "x", "-1", "mesh.vtu"}), InputError);
+    EXPECT_THROW(serveReader(std::vector<std::string>{}, {}), InputError);
+    EXPECT_THROW(serveReader(std::vector<std::string>{"1", "2", "x", "-1", "mesh.vtu"}, {}), InputError);
 }
 
 TEST(ReaderRequest, SurvivesItsWords) {
-    const ReaderRequest request{42, 1 << 30, 3, "a mesh.vtu", {{"p", "a b", ""}, 7}};
+    const ReaderRequest request{42, 1 << 30, 3, "a mesh.vtu", {{"p", "a b", ""}, 7}, "task", "body"};
     const ReaderRequest copy = parseRequest(requestWords(request));
     EXPECT_EQ(copy.parent, 42);
     EXPECT_EQ(copy.memoryBytes, 1 << 30);
@@ -447,6 +451,8 @@ TEST(ReaderRequest, SurvivesItsWords) {
     EXPECT_EQ(copy.path, "a mesh.vtu");
     EXPECT_EQ(copy.options.fields, request.options.fields);
     EXPECT_EQ(copy.options.timeStep, 7);
+    EXPECT_EQ(copy.task, "task");
+    EXPECT_EQ(copy.body, "body");
 }
 
 TEST(DefaultLimits, GrowWithTheFilesAndStaySmallForSmallOnes) {
@@ -551,21 +557,21 @@ TEST(MeshPacket, EveryDamagedByteIsRefusedOrHarmless) {
     const TemporaryFolder folder;
     const MeshFile file = readMesh(folder.write("mesh.vtu", twoTets().text()), {}, {});
     std::vector<std::byte> packet;
-    writePacket(file, [&](const void* bytes, std::size_t count) {
+    packMesh(file).writeTo([&](const void* bytes, std::size_t count) {
         const auto* first = static_cast<const std::byte*>(bytes);
         packet.insert(packet.end(), first, first + count);
     });
-    ASSERT_EQ(std::int64_t(packet.size()), packetBytes(file));
-    expectEqual(readPacket(packet, {}), file);
+    ASSERT_EQ(std::int64_t(packet.size()), packMesh(file).bytes());
+    expectEqual(unpackMesh(packet, {}), file);
     for (std::size_t size = 0; size < packet.size(); ++size)
-        EXPECT_THROW(readPacket(std::span(packet).first(size), {}), DamagedPacket);
+        EXPECT_THROW(unpackMesh(std::span(packet).first(size), {}), DamagedPacket);
     int refused = 0;
     for (std::size_t at = 0; at < packet.size(); ++at) {
         for (const int bit : {0, 3, 7}) {
             std::vector<std::byte> damaged = packet;
             damaged[at] ^= std::byte(1 << bit);
             try {
-                const MeshFile read = readPacket(damaged, {});
+                const MeshFile read = unpackMesh(damaged, {});
                 EXPECT_NO_THROW(checkMesh(read.mesh));
             } catch (const DamagedPacket&) {
                 ++refused;
@@ -580,7 +586,7 @@ TEST(MeshPacket, WildIndicesAndCoordinatesAreRefused) {
     const MeshFile file = readMesh(folder.write("mesh.vtu", twoTets().text()), {}, {});
     const auto packetOf = [](MeshFile changed) {
         std::vector<std::byte> packet;
-        writePacket(std::move(changed), [&](const void* bytes, std::size_t count) {
+        packMesh(std::move(changed)).writeTo([&](const void* bytes, std::size_t count) {
             const auto* first = static_cast<const std::byte*>(bytes);
             packet.insert(packet.end(), first, first + count);
         });
@@ -588,12 +594,12 @@ TEST(MeshPacket, WildIndicesAndCoordinatesAreRefused) {
     };
     MeshFile infinite = file;
     infinite.mesh.points[1].y = INFINITY;
-    EXPECT_THROW(readPacket(packetOf(infinite), {}), DamagedPacket);
+    EXPECT_THROW(unpackMesh(packetOf(infinite), {}), DamagedPacket);
     std::vector<std::byte> packet = packetOf(file);
     const auto first = packet.size() - 7 * sizeof(double) - 2 * 4 * sizeof(std::int32_t);
     for (const std::int32_t node : {5, -1, 2147483647}) {
         std::memcpy(packet.data() + first, &node, sizeof node);
-        EXPECT_THROW(readPacket(packet, {}), DamagedPacket);
+        EXPECT_THROW(unpackMesh(packet, {}), DamagedPacket);
     }
 }
 

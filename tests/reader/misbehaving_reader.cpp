@@ -19,15 +19,15 @@
 #include <thread>
 #include <vector>
 
-#include "reader/isolated_reader.h"
+#include "reader/isolated_vdb.h"
 #include "reader/reader_process.h"
 #include "reader/reader_report.h"
-#include "reader/serve_mesh_reader.h"
+#include "reader/serve_reader.h"
 #include "tessera/error.h"
 
 namespace {
 
-using tessera::kMeshDescriptor;
+using tessera::kAnswerDescriptor;
 using tessera::kReportDescriptor;
 using tessera::ReaderOutcome;
 using tessera::ReportStart;
@@ -37,7 +37,7 @@ void put(int descriptor, const void* bytes, std::size_t count) {
 }
 
 void claimMesh() {
-    const ReportStart start{ReportStart::kMagic, ReaderOutcome::meshInMemory, 0};
+    const ReportStart start{ReportStart::kMagic, ReaderOutcome::answerInMemory, 0};
     put(kReportDescriptor, &start, sizeof start);
 }
 
@@ -63,7 +63,7 @@ int countMebibytes() {
 /// Descriptors that are open beside the five a reader has.
 std::string otherDescriptors() {
     std::string list;
-    for (int d = kMeshDescriptor + 1; d < 1024; ++d)
+    for (int d = kAnswerDescriptor + 1; d < 1024; ++d)
         if (fcntl(d, F_GETFD) >= 0) list += std::to_string(d) + " ";
     return list;
 }
@@ -131,13 +131,13 @@ const std::map<std::string, std::function<void()>> kImpostors{
     {"noise-as-mesh",
      [] {
          const std::vector<char> noise(4096, '\x5a');
-         put(kMeshDescriptor, noise.data(), noise.size());
+         put(kAnswerDescriptor, noise.data(), noise.size());
          claimMesh();
      }},
     {"writable-mesh",
      [] {
-         if (ftruncate(kMeshDescriptor, 4096) != 0) _exit(98);
-         if (mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, kMeshDescriptor, 0) == MAP_FAILED)
+         if (ftruncate(kAnswerDescriptor, 4096) != 0) _exit(98);
+         if (mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, kAnswerDescriptor, 0) == MAP_FAILED)
              _exit(97);
          claimMesh();
          pause();
@@ -154,15 +154,20 @@ int main(int argc, char** argv) {
         _exit(0);
     }
     const std::vector<std::string> words(argv + 2, argv + argc);
-    if (mode == "read") _exit(tessera::serveMeshReader(words));
+    const auto serve = [&](tessera::MeshReader read) {
+        std::vector<tessera::ReaderTask> tasks = tessera::vdbTasks();
+        tasks.push_back(tessera::meshTask(std::move(read)));
+        _exit(tessera::serveReader(words, tasks));
+    };
+    if (mode == "read") serve(tessera::readMesh);
     if (mode == "threads")
-        _exit(tessera::serveMeshReader(words,
-                                       [](const std::string&, const tessera::ReadOptions&,
-                                          const tessera::Execution& execution) -> tessera::MeshFile {
-                                           throw tessera::InputError(std::to_string(execution.threads));
-                                       }));
+        serve([](const std::string&, const tessera::ReadOptions&,
+                 const tessera::Execution& execution) -> tessera::MeshFile {
+            throw tessera::InputError(std::to_string(execution.threads));
+        });
     const auto reader = kReaders.find(mode);
     if (reader == kReaders.end()) return 95;
-    _exit(tessera::serveMeshReader(words, [&](const std::string& path, const tessera::ReadOptions&,
-                                              const tessera::Execution&) { return reader->second(path); }));
+    serve([&](const std::string& path, const tessera::ReadOptions&, const tessera::Execution&) {
+        return reader->second(path);
+    });
 }

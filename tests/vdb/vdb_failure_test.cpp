@@ -1,6 +1,5 @@
 #include <atomic>
 
-#include "base/sanitizers.h"
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
@@ -124,22 +123,6 @@ TEST_F(VdbFailureTest, FilesOfOtherProgramsGiveTheirLattice) {
     EXPECT_THROW(readVdbLattice(file("turned.vdb")), InputError);
     openvdb::io::File(file("empty.vdb")).write(openvdb::GridPtrVec{});
     EXPECT_THROW(readVdbLattice(file("empty.vdb")), InputError);
-
-    // Without a digest nothing vouches for the bytes: any damage must end in an exception or a frame, never
-    // in a crash.
-    const std::string good = readBytes(file("other.vdb"));
-    // Under the address sanitizer there is no limit on memory, and some take all the time they may.
-    constexpr std::uint32_t kDamagedFiles = kIsAddressSanitized ? 6 : 60;
-    for (std::uint32_t i = 0; i < kDamagedFiles; ++i) {
-        std::string bad = good;
-        for (std::uint32_t k = 0; k < 3; ++k)
-            bad[57 + scramble(i * 3 + k) % 400] = char(scramble(i + k) & 255);
-        writeBytes(file("bad.vdb"), bad);
-        try {
-            readVdbLattice(file("bad.vdb"));
-        } catch (const InputError&) {
-        }
-    }
 }
 
 TEST_F(VdbFailureTest, FileSavedAgainByAnotherProgramStillReads) {

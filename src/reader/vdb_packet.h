@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "reader/packet.h"
+#include "tessera/execution.h"
+#include "vdb/vdb_file.h"
+
+namespace tessera {
+
+/// What of a VDB file is handed over.
+enum class VdbContents { all, withoutValues };
+
+/// Throws std::bad_alloc where whoever unpacks it would need more than that.
+Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes);
+
+/// The file in a packet, bit for bit; without values its store has no channels. Nothing is believed: the
+/// metadata is decoded anew, and every tile lies in a brick or where an extension may, no two in one place.
+/// Throws DamagedPacket.
+VdbFile unpackVdb(std::span<const std::byte> packet, const Execution& execution);
+
+}  // namespace tessera
