@@ -91,6 +91,11 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
             "seconds that reading may take (default: 3 of processor time and 60 until the end, and more "
             "for large files); not with --reader in-process")
         ->group(group);
+    command
+        .add_flag("--follow-links", a.followsLinks,
+                  "files may name others anywhere: pieces, steps, external values, links. Else only in the "
+                  "folder of the file that is named, and below it")
+        ->group(group);
     if (!command.get_option_no_throw("--max-memory"))
         command
             .add_option(
@@ -338,6 +343,8 @@ void addInfoOptions(CLI::App& command, InfoArguments& arguments) {
                        "a mesh file, a .vdb file that tessera wrote, or a series as resample takes it: mesh "
                        "files, patterns, or one .pvd file");
     command.add_flag("--gl", arguments.request.gl, "what OpenGL this machine has; the file may be left out");
+    command.add_flag("--limits", arguments.request.limits,
+                     "what the process that reads files is kept from; the file may be left out");
     addTimeStep(command, arguments.request.timeStep);
     addRepairOptions(command, arguments.repair);
     addCommonOptions(command, arguments.common);

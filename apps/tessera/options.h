@@ -18,6 +18,7 @@ namespace tessera {
 struct ReaderArguments {
     std::string kind = "isolated", maxMemory;  ///< maxMemory: empty for a bound from the file's size
     std::optional<double> maxSeconds;
+    bool followsLinks = false;
     bool memoryBoundsRun = false;  ///< the command keeps to maxMemory after reading too
 };
 

@@ -70,6 +70,7 @@ Session::Session(const CommonOptions& options, const std::string& output)
     };
     const ReaderArguments& reader = options.reader;
     checkReaderOptions(reader);
+    job.followsLinks = reader.followsLinks;
     if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quickReaderBeside(program)};
     if (!reader.maxMemory.empty())
         job.readerLimits.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);

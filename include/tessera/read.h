@@ -25,6 +25,8 @@ struct InputOptions {
     /// Bounds on that process, bytes and seconds; 0: by the size of the file.
     std::int64_t maxMemoryBytes = 0;
     double maxSeconds = 0;
+    /// Files may name others outside their folder: pieces, steps, links.
+    bool followsLinks = false;
 };
 
 /// A mesh and where it is from.

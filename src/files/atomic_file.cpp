@@ -56,13 +56,15 @@ std::string reason(int error) {
     throw IoError("can't write " + path + ": " + why);
 }
 
-// A symbolic link is followed, so that the file it names is replaced and not the link.
+// A symbolic link is followed, so that the file it names is made or replaced and not the link.
 fs::path resolveTarget(const std::string& path) {
+    constexpr int kMostLinks = 40;  // as the kernel has it
     std::error_code error;
-    const fs::path name(path);
-    if (fs::is_symlink(name, error)) {
-        const fs::path target = fs::canonical(name, error);
-        if (!error) return target;
+    fs::path name(path);
+    for (int links = 0; fs::is_symlink(name, error); ++links) {
+        if (links == kMostLinks) fail(path, reason(ELOOP));
+        name = name.parent_path() / fs::read_symlink(name, error);
+        if (error) fail(path, reason(error.value()));
     }
     return name;
 }

@@ -48,7 +48,11 @@ InputFile::InputFile(const std::string& path) : path_(path) {
     checkStatus(path, status);  // before a device is opened, which may do something
     // Should it have become a pipe by now, nobody waits for its writer.
     descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (descriptor_ < 0) throw InputError(path + ": can't be read: " + std::strerror(errno));
+    if (descriptor_ < 0) {
+        const std::string why = path + ": can't be read: " + std::strerror(errno);
+        if (errno == EMFILE || errno == ENFILE) throw IoError(why);  // not the file's fault
+        throw InputError(why);
+    }
     try {
         if (::fstat(descriptor_, &status) != 0)
             throw InputError(path + ": can't be read: " + std::strerror(errno));

@@ -13,6 +13,7 @@
 #include "job/report_text.h"
 #include "job/series_steps.h"
 #include "job/vdb_contents.h"
+#include "reader/confine.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -210,6 +211,15 @@ Json showFiles(const DescribeRequest& request, Job& job) {
     return showMesh(request, steps[0].files[0], job);
 }
 
+/// What a process that reads files is kept from on this system.
+std::string limitsText(const Confinement& kept) {
+    return std::string("files are read in a separate process with limits on memory and time\n") +
+           (kept.files ? "  Landlock: it writes nothing, and reads only the folder of the file and below\n"
+                       : "  no Landlock on this system: it could write, and read any file\n") +
+           (kept.calls ? "  seccomp: it has no network and starts no program\n"
+                       : "  no seccomp on this system: it could use the network and start programs\n");
+}
+
 }  // namespace
 
 bool isVdbName(const std::string& path) {
@@ -217,13 +227,19 @@ bool isVdbName(const std::string& path) {
 }
 
 Json describeFiles(const DescribeRequest& request, Job& job) {
-    if (request.paths.empty() && !request.gl) throw InputError("info needs a file, or --gl");
+    if (request.paths.empty() && !request.gl && !request.limits)
+        throw InputError("info needs a file, --gl or --limits");
     checkOutputPaths(request.paths, {{"--json", job.reportPath}});
     job.execution.declare({{Stage::reading, 1}, {Stage::repairing, request.repair ? 1.0 : 0.0}});
     Json json = request.paths.empty() ? head({}) : showFiles(request, job);
     if (request.gl) {
         job.say(glText(job.textWidth));
         json["gl"] = glJson();
+    }
+    if (request.limits) {
+        const Confinement kept = availableConfinement();
+        job.say(limitsText(kept));
+        json["limits"] = {{"landlock", kept.files}, {"seccomp", kept.calls}};
     }
     return json;
 }

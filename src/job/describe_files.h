@@ -17,6 +17,7 @@ struct DescribeRequest {
     int timeStep = -1;  ///< ReadOptions::timeStep
     std::optional<RepairOptions> repair;  ///< of a mesh: shows what a repair would do
     bool gl = false;                      ///< what OpenGL there is, too
+    bool limits = false;                  ///< what a process that reads files is kept from, too
 };
 
 /// Whether the name is that of a .vdb file.

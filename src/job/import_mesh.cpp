@@ -17,7 +17,9 @@ namespace {
 constexpr double kReadBytesPerMs = 20e3, kReadStartMs = 150;  // with checks and handing over
 }
 
-MeshFile openMesh(const std::string& path, const ReadOptions& options, Job& job) {
+MeshFile openMesh(const std::string& path, const ReadOptions& given, Job& job) {
+    ReadOptions options = given;
+    options.followsLinks |= job.followsLinks;
     if (isCollectionName(path)) {
         const SeriesStep step = chosenStep(path, options.timeStep);
         return openMesh(step.files[0], readOptions(step, options.fields, -1), job);

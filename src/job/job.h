@@ -21,6 +21,7 @@ struct Job {
     Execution execution;
     std::optional<IsolatedReader> reader;       ///< reads meshes in a separate process; none: this one reads
     IsolationLimits readerLimits;               ///< of that process
+    bool followsLinks = false;                  ///< meshes may name files outside their folder
     std::size_t textWidth = kUsualTextWidth;    ///< columns that tables keep to
     Listener say = [](const std::string&) {};   ///< text for a person, as the work goes on: whole lines
     Listener warn = [](const std::string&) {};  ///< one sentence about something odd

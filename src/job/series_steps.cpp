@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "files/named_file.h"
 #include "mesh/field_range.h"
 #include "tessera/error.h"
 
@@ -76,7 +77,9 @@ SeriesStep chosenStep(const std::string& collection, int number) {
 }
 
 ReadOptions readOptions(const SeriesStep& step, std::vector<std::string> fields, int timeStep) {
-    return {std::move(fields), timeStep, {step.files.begin() + 1, step.files.end()}};
+    ReadOptions options{std::move(fields), timeStep, {step.files.begin() + 1, step.files.end()}};
+    if (!step.collection.empty()) options.folder = folderOf(step.collection);
+    return options;
 }
 
 TimeRange parseTimes(const std::string& text) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "files/named_file.h"
 #include "mesh_files/mesh_series.h"
 #include "reader/isolated_reader.h"
 #include "tessera/error.h"
@@ -49,10 +50,11 @@ IsolatedReader findReader(const std::string& given) {
     return {program, {"read-mesh"}, quickReaderBeside(program)};
 }
 
-InputMesh readFiles(const std::vector<std::string>& files, int step, const InputOptions& options,
-                    const Execution& execution) {
+InputMesh readFiles(const std::vector<std::string>& files, const std::string& folder, int step,
+                    const InputOptions& options, const Execution& execution) {
     if (files.empty()) throw InputError("a step without a file can't be read");
-    const ReadOptions read{options.fields, step, {files.begin() + 1, files.end()}};
+    const ReadOptions read{
+        options.fields, step, {files.begin() + 1, files.end()}, folder, options.followsLinks};
     execution.report(Stage::reading, 0, 1);
     IsolationLimits limits;
     limits.memoryBytes = options.maxMemoryBytes;
@@ -73,7 +75,8 @@ void useProgram(const char* path) {
 }
 
 InputMesh read(const InputStep& step, const InputOptions& options, const Execution& execution) {
-    InputMesh input = readFiles(step.files, options.step, options, execution);
+    InputMesh input = readFiles(step.files, step.collection.empty() ? "" : folderOf(step.collection),
+                                options.step, options, execution);
     input.time = step.time;
     // The parts of a mesh have the name of the file that lists them.
     if (step.files.size() > 1) input.sourceFile = std::filesystem::path(step.collection).filename().string();
@@ -81,7 +84,7 @@ InputMesh read(const InputStep& step, const InputOptions& options, const Executi
 }
 
 InputMesh read(const std::string& path, const InputOptions& options, const Execution& execution) {
-    if (!isCollectionName(path)) return readFiles({path}, options.step, options, execution);
+    if (!isCollectionName(path)) return readFiles({path}, "", options.step, options, execution);
     const std::vector<InputStep> steps = listSteps({path});
     if (options.step >= int(steps.size()))
         throw InputError(path + ": there is no time step " + std::to_string(options.step) + "; it has " +

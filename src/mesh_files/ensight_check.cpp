@@ -1,7 +1,5 @@
 #include "mesh_files/ensight_check.h"
 
-#include <glob.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -30,14 +29,29 @@ std::string lastWord(std::string_view line) {
     return space == std::string_view::npos ? std::string() : std::string(line.substr(space + 1));
 }
 
-std::vector<std::filesystem::path> filesNamed(const std::string& casePath, std::string name) {
-    std::replace(name.begin(), name.end(), '*', '?');
-    glob_t found{};
+/// Those in one folder whose names are `pattern` with any one character for each *.
+std::vector<std::filesystem::path> filesLike(const std::filesystem::path& folder,
+                                             const std::string& pattern) {
     std::vector<std::filesystem::path> files;
-    if (::glob((std::filesystem::path(casePath).parent_path() / name).c_str(), 0, nullptr, &found) == 0)
-        files.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
-    ::globfree(&found);
+    std::error_code error;
+    int looked = 0;
+    for (std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error), end;
+         !error && entry != end && looked < kMostFiles; entry.increment(error), ++looked) {
+        const std::string name = entry->path().filename().string();
+        const bool fits = name.size() == pattern.size() &&
+                          std::equal(name.begin(), name.end(), pattern.begin(),
+                                     [](char c, char like) { return c == like || like == '*'; });
+        if (fits) files.push_back(folder / name);
+    }
+    std::sort(files.begin(), files.end());
     return files;
+}
+
+std::vector<std::filesystem::path> filesNamed(const std::string& casePath, const std::string& name) {
+    const std::filesystem::path path = std::filesystem::path(casePath).parent_path() / name;
+    const std::string pattern = path.filename().string();
+    if (pattern.find('*') == std::string::npos) return {path};
+    return filesLike(path.parent_path(), pattern);
 }
 
 /// 0 for a folder: the last word of a line need not mean a file.
@@ -69,7 +83,7 @@ Ends endsOf(const std::string& path) {
 
 }  // namespace
 
-EnSightCase checkEnSightCase(const std::string& path) {
+EnSightCase checkEnSightCase(const std::string& path, const std::optional<std::string>& folder) {
     InputFile file(path);
     EnSightCase found;
     found.bytes = std::int64_t(file.size());
@@ -82,6 +96,7 @@ EnSightCase checkEnSightCase(const std::string& path) {
         if (name.empty()) continue;
         for (const std::filesystem::path& named : filesNamed(path, name)) {
             const std::int64_t bytes = checkedSize(path, named);
+            if (bytes > 0 && folder) checkInFolder(*folder, path, named.string());
             found.bytes += bytes;
             if (bytes > 0) found.named.emplace(named.string(), bytes);
             if (++files == kMostFiles) break;

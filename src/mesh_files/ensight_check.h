@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,9 @@ struct EnSightCase {
     std::int64_t bytes = 0;                     ///< of all
     std::map<std::string, std::int64_t> named;  ///< path and bytes of those named; none is empty
 };
-/// Throws InputError when one of the files is a pipe or a device, at which VTK's reader would wait for ever.
-EnSightCase checkEnSightCase(const std::string& path);
+/// Throws InputError when one of the files is a pipe or a device, at which VTK's reader would wait for ever,
+/// or lies outside `folder`. A * in a file's name, not in a folder's, is any one character.
+EnSightCase checkEnSightCase(const std::string& path, const std::optional<std::string>& folder);
 
 /// A sentence when some of the files end as none does that was written to its end, within a line of text or a
 /// binary number: VTK's reader makes up values there.

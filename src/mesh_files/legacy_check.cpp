@@ -80,8 +80,7 @@ class LegacyCheck {
 std::size_t LegacyCheck::checkHead() {
     const std::string_view first = file_.bytesFrom(0, 32);
     if (!first.starts_with("# vtk DataFile Version"))
-        throw InputError(path_ + ": isn't a VTK file: it begins with " + quoted(first) +
-                         ", expected '# vtk DataFile Version'");
+        throw InputError(path_ + ": isn't a VTK file: it doesn't begin with '# vtk DataFile Version'");
     const std::size_t title = file_.find("\n", 0);
     const std::size_t titleEnd = title == InputFile::npos ? title : file_.find("\n", title + 1);
     const std::size_t kind =

@@ -2,6 +2,7 @@
 
 #include <vtk_cgns.h>
 #include <vtk_exodusII.h>
+#include <vtk_hdf5.h>
 #include <vtk_netcdf.h>
 #include VTK_CGNS(cgns_io.h)
 #include VTK_CGNS(cgnslib.h)
@@ -10,6 +11,7 @@
 #include <array>
 #include <cstdint>
 
+#include "files/input_file.h"
 #include "mesh_files/netcdf_check.h"
 #include "tessera/error.h"
 
@@ -18,6 +20,7 @@ namespace tessera {
 namespace {
 
 constexpr std::int64_t kNodesAtOnce = 1 << 20;
+constexpr int kDeepestNode = 64, kMostChildren = 1 << 20;
 
 /// A NetCDF file that is open. What isn't there has length -1.
 class NetcdfFile {
@@ -156,7 +159,76 @@ CgnsFields listFields(const std::string& path) {
     return fields;
 }
 
+/// What of an HDF5 file reads another one; empty: nothing.
+struct Hdf5Finding {
+    std::string what;
+};
+
+herr_t visitLink(hid_t group, const char* name, const H5L_info_t* info, void* data) {
+    auto& found = *static_cast<Hdf5Finding*>(data);
+    if (info->type == H5L_TYPE_EXTERNAL || info->type >= H5L_TYPE_UD_MIN) {
+        found.what = std::string("a link to another file, ") + name;
+        return 1;
+    }
+    if (info->type != H5L_TYPE_HARD) return 0;
+    const hid_t object = H5Oopen(group, name, H5P_DEFAULT);
+    if (object < 0) return 0;
+    if (H5Iget_type(object) == H5I_DATASET) {
+        const hid_t plan = H5Dget_create_plist(object);
+        if (plan >= 0 && (H5Pget_external_count(plan) > 0 || H5Pget_layout(plan) == H5D_VIRTUAL))
+            found.what = std::string("values in another file, of ") + name;
+        H5Pclose(plan);
+    }
+    H5Oclose(object);
+    return found.what.empty() ? 0 : 1;
+}
+
+/// Links of the older kind of CGNS files, and names of files in those of HDF5.
+std::string findCgnsLink(int file, double node, int depth) {
+    int length = 0;
+    if (depth > kDeepestNode) return "nodes in more than 64 levels";
+    if (cgio_is_link(file, node, &length) != 0) return {};
+    if (length > 0) {
+        int fileLength = 0, nodeLength = 0;
+        if (cgio_link_size(file, node, &fileLength, &nodeLength) == 0 && fileLength > 0)
+            return "a link to another file";
+        return {};
+    }
+    int children = 0, got = 0;
+    if (cgio_number_children(file, node, &children) != 0 || children <= 0) return {};
+    std::vector<double> ids(std::size_t(std::min(children, kMostChildren)));
+    if (cgio_children_ids(file, node, 1, int(ids.size()), &got, ids.data()) != 0) return {};
+    for (int c = 0; c < got; ++c)
+        if (std::string link = findCgnsLink(file, ids[std::size_t(c)], depth + 1); !link.empty()) return link;
+    return {};
+}
+
+[[noreturn]] void refuseLink(const std::string& path, const std::string& what) {
+    throw InputError(path + ": holds " + what + "; --follow-links lets files name others anywhere");
+}
+
 }  // namespace
+
+void refuseLinks(const std::string& path) {
+    const std::string magic = InputFile(path).copy(0, 8);
+    if (magic == "\x89HDF\r\n\x1a\n") {
+        H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+        const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+        if (file < 0) return;  // the reader will say why
+        Hdf5Finding found;
+        H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, visitLink, &found);
+        H5Fclose(file);
+        if (!found.what.empty()) refuseLink(path, found.what);
+        return;
+    }
+    int file = 0;
+    double root = 0;
+    if (magic.starts_with("CDF") || cgio_open_file(path.c_str(), CGIO_MODE_READ, CGIO_FILE_NONE, &file) != 0)
+        return;
+    const std::string link = cgio_get_root_id(file, &root) == 0 ? findCgnsLink(file, root, 0) : std::string();
+    cgio_close_file(file);
+    if (!link.empty()) refuseLink(path, link);
+}
 
 void checkExodusFile(const std::string& path) {
     // The Exodus library prints when it can't open a file, whatever its options say; the one below doesn't.

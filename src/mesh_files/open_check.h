@@ -5,6 +5,10 @@
 
 namespace tessera {
 
+/// Throws InputError for a file that reads others: by a link of HDF5 or CGNS to another file, or by external
+/// or virtual storage of HDF5.
+void refuseLinks(const std::string& path);
+
 /// Opens and closes a file with the library beneath VTK's reader: that reader prints, or even ends the
 /// process, when it can't. Checks the elements' nodes, which VTK's reader takes as they are. Throws
 /// InputError.

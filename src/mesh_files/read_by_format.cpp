@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "mesh_files/assemble_mesh.h"
 #include "mesh_files/raw_mesh.h"
 #include "mesh_files/read_tetgen.h"
@@ -109,6 +110,11 @@ void warnOfEmptyPart(const RawMesh& part, const std::string& path, ImportStatist
 }
 
 }  // namespace
+
+std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options) {
+    if (options.followsLinks) return std::nullopt;
+    return options.folder.empty() ? folderOf(path) : options.folder;
+}
 
 MeshFile readByFormat(const std::string& path, const ReadOptions& options, const Execution& execution,
                       OpenVtkFormat openOther) {

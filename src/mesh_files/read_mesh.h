@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,13 @@ struct ReadOptions {
     std::vector<std::string> fields;        ///< names to read; empty: all
     int timeStep = -1;                      ///< formats with steps: which one, counted from 0; -1: the last
     std::vector<std::string> otherParts{};  ///< further files of the same format that hold parts of this mesh
+    /// Files may name others in this folder and below it; empty: the folder of the file that is read.
+    std::string folder{};
+    bool followsLinks = false;  ///< they may name others anywhere
 };
+
+/// The folder in which a file and those that it names have to lie; none where it may be any.
+std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options);
 
 struct MeshFile {
     TetMesh mesh;

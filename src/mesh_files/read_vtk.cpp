@@ -212,12 +212,12 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
              const Execution& execution, OpenVtkFormat openOther) {
     RawMesh raw;
     DeclaredSize info;
-    if (format == VtkFormat::xml) info = checkXmlFile(path);
+    if (format == VtkFormat::xml) info = checkXmlFile(path, allowedFolder(path, options));
     if (format == VtkFormat::legacy) checkLegacyFile(path);
     const VtkMessages messages;
     VtkSource opened = format == VtkFormat::xml      ? openXml(path, info)
                        : format == VtkFormat::legacy ? openLegacy(path)
-                                                     : openOther(path, format);
+                                                     : openOther(path, format, options);
     std::vector<ArrayInfo> unread;
     if (auto* xml = vtkXMLReader::SafeDownCast(opened.reader)) {
         xml->UpdateInformation();

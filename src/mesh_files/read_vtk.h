@@ -10,7 +10,7 @@ namespace tessera {
 enum class VtkFormat { xml, legacy, exodus, cgns, ensight, openfoam };
 
 struct VtkSource;
-using OpenVtkFormat = VtkSource (*)(const std::string& path, VtkFormat format);
+using OpenVtkFormat = VtkSource (*)(const std::string& path, VtkFormat format, const ReadOptions& options);
 
 /// Reads a file through VTK. Errors that VTK reports become InputError; nothing is printed.
 /// @param openOther opens what is neither XML nor legacy; null: those throw OtherFormatError.

@@ -17,7 +17,8 @@ namespace tessera {
 
 namespace {
 
-VtkSource openExodus(const std::string& path) {
+VtkSource openExodus(const std::string& path, const ReadOptions& options) {
+    if (!options.followsLinks) refuseLinks(path);
     checkExodusFile(path);
     auto reader = vtkSmartPointer<vtkExodusIIReader>::New();
     reader->SetFileName(path.c_str());
@@ -33,7 +34,8 @@ VtkSource openExodus(const std::string& path) {
     return {reader, "Exodus II", vtkExodusIIReader::GetImplicitNodeIdArrayName()};
 }
 
-VtkSource openCgns(const std::string& path) {
+VtkSource openCgns(const std::string& path, const ReadOptions& options) {
+    if (!options.followsLinks) refuseLinks(path);
     const CgnsFields fields = checkCgnsFile(path);
     auto reader = vtkSmartPointer<vtkCGNSReader>::New();
     reader->SetFileName(path.c_str());
@@ -57,8 +59,8 @@ VtkSource openCgns(const std::string& path) {
     return {reader, "CGNS", {}, fields.warnings};
 }
 
-VtkSource openEnSight(const std::string& path) {
-    std::vector<std::string> warnings = findCutOffFiles(checkEnSightCase(path));
+VtkSource openEnSight(const std::string& path, const ReadOptions& options) {
+    std::vector<std::string> warnings = findCutOffFiles(checkEnSightCase(path, allowedFolder(path, options)));
     auto reader = vtkSmartPointer<vtkGenericEnSightReader>::New();
     reader->SetCaseFileName(path.c_str());
     reader->ReadAllVariablesOn();
@@ -86,14 +88,14 @@ VtkSource openFoam(const std::string& path) {
 
 }  // namespace
 
-VtkSource openSolverFormat(const std::string& path, VtkFormat format) {
+VtkSource openSolverFormat(const std::string& path, VtkFormat format, const ReadOptions& options) {
     switch (format) {
         case VtkFormat::exodus:
-            return openExodus(path);
+            return openExodus(path, options);
         case VtkFormat::cgns:
-            return openCgns(path);
+            return openCgns(path, options);
         case VtkFormat::ensight:
-            return openEnSight(path);
+            return openEnSight(path, options);
         case VtkFormat::openfoam:
             return openFoam(path);
         default:

@@ -9,6 +9,6 @@ namespace tessera {
 /// Opens the formats of simulation programs: Exodus, CGNS, EnSight, OpenFOAM. It stands alone because a
 /// program that doesn't refer to it needn't load their libraries, which takes a tenth of a second. Throws
 /// InputError.
-VtkSource openSolverFormat(const std::string& path, VtkFormat format);
+VtkSource openSolverFormat(const std::string& path, VtkFormat format, const ReadOptions& options);
 
 }  // namespace tessera

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "files/xml_tags.h"
 #include "mesh_files/xml_arrays.h"
 #include "tessera/error.h"
@@ -62,6 +63,7 @@ struct Extent {
 
 class XmlCheck {
   public:
+    explicit XmlCheck(const std::optional<std::string>& folder) : folder_(folder) {}
     DeclaredSize run(const std::string& path, int depth);
 
   private:
@@ -93,6 +95,7 @@ class XmlCheck {
     std::int64_t count(const File& file, const XmlTag& tag, std::string_view name) const;
     std::optional<Extent> extent(const File& file, const XmlTag& tag, std::string_view name) const;
 
+    const std::optional<std::string>& folder_;
     std::set<std::string> known_;  ///< files that were looked at
 };
 
@@ -138,8 +141,8 @@ std::size_t XmlCheck::checkFrame(File& file) const {
     InputFile& input = file.input;
     const std::size_t start = skipProlog(input, input.bytesFrom(0, 3).starts_with("\xef\xbb\xbf") ? 3 : 0);
     if (!input.bytesFrom(start, 8).starts_with("<VTKFile"))
-        throw InputError(path + ": isn't a VTK XML file: byte " + std::to_string(start) + " has " +
-                         quoted(input.bytesFrom(start, kQuoted)) + ", expected <VTKFile");
+        throw InputError(path + ": isn't a VTK XML file: byte " + std::to_string(start) +
+                         " is not the first of <VTKFile");
     const auto tag = XmlTags(input, start, start + 1).next();
     if (!tag)
         throw InputError(path + ": cut off at byte " + std::to_string(input.size()) + ", inside <VTKFile");
@@ -220,6 +223,7 @@ void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view at
     const auto name = attributeOf(tag.text, attribute);
     if (!name || name->empty()) return;
     const auto piece = std::filesystem::path(file.path).parent_path() / decodeEntities(*name);
+    if (folder_) checkInFolder(*folder_, file.path, piece.string());
     std::error_code error;
     if (!std::filesystem::exists(piece, error))
         throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": names " + piece.string() +
@@ -287,8 +291,8 @@ DeclaredSize XmlCheck::run(const std::string& path, int depth) {
 
 }  // namespace
 
-DeclaredSize checkXmlFile(const std::string& path) {
-    return XmlCheck().run(path, 0);
+DeclaredSize checkXmlFile(const std::string& path, const std::optional<std::string>& folder) {
+    return XmlCheck(folder).run(path, 0);
 }
 
 }  // namespace tessera

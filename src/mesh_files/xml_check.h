@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace tessera {
@@ -19,6 +20,7 @@ struct DeclaredSize {
 /// and the files that it names declare no more than their sizes can hold: points, cells, extents, components
 /// and the sizes in front of packed arrays. Takes time in proportion to the files' sizes. Throws InputError
 /// with the byte.
-DeclaredSize checkXmlFile(const std::string& path);
+/// @param folder that named files have to lie in; none where it may be any.
+DeclaredSize checkXmlFile(const std::string& path, const std::optional<std::string>& folder);
 
 }  // namespace tessera

@@ -106,6 +106,7 @@ void IsolatedReading::failWithGarbage(const std::string& why) const {
 }
 
 void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
+    if (end.byProcessorLimit) throw IoError(name_ + ": the reader " + end.words);
     throw InputError(name_ + ": the reader " + end.words + kSuspicion);
 }
 

@@ -6,8 +6,10 @@
 #include <cctype>
 #include <filesystem>
 #include <limits>
+#include <optional>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "mesh_files/ensight_check.h"
 #include "mesh_files/legacy_check.h"
 #include "mesh_files/xml_check.h"
@@ -54,7 +56,7 @@ double bytesOfFolder(const std::filesystem::path& folder) {
     return bytes;
 }
 
-InputSize sizeOfInput(const std::string& path) {
+InputSize sizeOfInput(const std::string& path, const std::optional<std::string>& folder) {
     const std::filesystem::path given(path);
     std::string extension = given.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -65,11 +67,12 @@ InputSize sizeOfInput(const std::string& path) {
     const std::string head = file.copy(0, kHeadBytes);
     const bool isLegacy = head.starts_with("# vtk DataFile");
     if (isLegacy || head.find("<VTKFile") != std::string::npos) {
-        const DeclaredSize size = isLegacy ? checkLegacyFile(path) : checkXmlFile(path);
+        const DeclaredSize size = isLegacy ? checkLegacyFile(path) : checkXmlFile(path, folder);
         const std::int64_t cells = size.fileBytes > kSmallFile ? size.cellsOfAll : 0;
         return {double(size.fileBytes), double(std::max(cells, size.gridPoints))};
     }
-    if (extension == ".case" || extension == ".encas") return {double(checkEnSightCase(path).bytes), 0};
+    if (extension == ".case" || extension == ".encas")
+        return {double(checkEnSightCase(path, folder).bytes), 0};
     if (extension == ".node" || extension == ".ele")
         return {double(sizeOf(std::filesystem::path(given).replace_extension(".node")) +
                        sizeOf(std::filesystem::path(given).replace_extension(".ele"))),
@@ -100,10 +103,16 @@ IsolationLimits limitsToLook() {
     return {std::int64_t(kFloorBytes), kFloorWaitSeconds, kLookSeconds};
 }
 
-IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts) {
-    InputSize size = sizeOfInput(path);
-    for (const std::string& part : otherParts) {
-        const InputSize more = sizeOfInput(part);
+IsolationLimits defaultLimits(const std::string& path, const ReadOptions& options) {
+    const std::optional<std::string> folder = allowedFolder(path, options);
+    // A file that the user named lies where it wants to; one that a .pvd file names doesn't.
+    if (folder && !options.folder.empty()) {
+        checkInFolder(*folder, options.folder, path);
+        for (const std::string& part : options.otherParts) checkInFolder(*folder, options.folder, part);
+    }
+    InputSize size = sizeOfInput(path, folder);
+    for (const std::string& part : options.otherParts) {
+        const InputSize more = sizeOfInput(part, folder);
         size.bytes += more.bytes;
         size.items += more.items;
     }

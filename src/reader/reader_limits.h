@@ -1,8 +1,9 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
+
+#include "mesh_files/read_mesh.h"
 
 namespace tessera {
 
@@ -25,8 +26,9 @@ IsolationLimits limitsToLook();
 /// and 96 bytes a byte of file, at most three quarters of the memory here; 3 s of processor time and a second
 /// for every 4 MB, and ten times that, 60 s at least, until the end. Structured grids, which hold more cells
 /// in fewer bytes, and files above 8 MB get more by the number of cells that they declare. Checks what a VTK
-/// file declares. Throws InputError when the file is missing, empty or damaged at first sight.
-IsolationLimits defaultLimits(const std::string& path, std::span<const std::string> otherParts = {});
+/// file declares. Throws InputError when the file is missing, empty or damaged at
+/// first sight, or it or one that it names lies outside the folder that is allowed.
+IsolationLimits defaultLimits(const std::string& path, const ReadOptions& options = {});
 
 /// Bounds for a VDB file: 192 MiB and 96 bytes a byte of file, and times as for meshes.
 IsolationLimits limitsOfVdb(const std::string& path);

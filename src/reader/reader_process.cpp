@@ -123,9 +123,23 @@ class SpawnPlan {
     posix_spawnattr_t attributes_;
 };
 
-ProcessEnd describe(int status) {
+/// Whether a limit that stood before this program ended a child.
+bool ranIntoProcessorLimit(int status, const rusage& used) {
+    rlimit limit{};
+    if (!WIFSIGNALED(status) || ::getrlimit(RLIMIT_CPU, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
+        return false;
+    // The kernel counts in ticks.
+    const double seconds = double(used.ru_utime.tv_sec + used.ru_stime.tv_sec) +
+                           double(used.ru_utime.tv_usec + used.ru_stime.tv_usec) * 1e-6;
+    return WTERMSIG(status) == SIGXCPU ||
+           (WTERMSIG(status) == SIGKILL && seconds > double(limit.rlim_cur) - 0.1);
+}
+
+ProcessEnd describe(int status, const rusage& used) {
+    if (ranIntoProcessorLimit(status, used))
+        return {"took more processor time than is allowed here (ulimit -t)", true, true};
     if (WIFEXITED(status))
-        return {"ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")", false};
+        return {"ended without a result (exit code " + std::to_string(WEXITSTATUS(status)) + ")"};
     const int number = WTERMSIG(status);
     if (number == SIGKILL) return {"was killed (signal 9), as the system does when memory runs out", true};
     const char* name = sigdescr_np(number);
@@ -205,16 +219,17 @@ ProcessEnd ReaderProcess::describeEnd() {
     // A process closes its files a moment before it can be reaped.
     for (int wait = 0; child_ >= 0 && wait < kEndMs; ++wait) {
         int status = 0;
-        const pid_t reaped = ::waitpid(child_, &status, WNOHANG);
+        rusage used{};
+        const pid_t reaped = ::wait4(child_, &status, WNOHANG, &used);
         if (reaped < 0 && errno != EINTR) break;  // where SIGCHLD is ignored there is nothing to reap
         if (reaped > 0) {
             child_ = -1;
-            return describe(status);
+            return describe(status, used);
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     kill();
-    return {"ended without a result", false};
+    return {"ended without a result"};
 }
 
 }  // namespace tessera

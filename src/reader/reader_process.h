@@ -47,6 +47,7 @@ class SealedMemory {
 struct ProcessEnd {
     std::string words;  ///< "crashed (signal 11, Segmentation fault)", "ended without a result (exit code 7)"
     bool bySignal = false;
+    bool byProcessorLimit = false;  ///< the system's (ulimit -t)
 };
 
 /// A running child with nothing but the two descriptors above; its standard streams lead nowhere, and it

@@ -9,10 +9,10 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kFixedWords = 9;
+constexpr std::size_t kFixedWords = 11;
 // The other program may be of another build: what they say to each other has a number, to be raised with each
 // change.
-constexpr const char* kProtocol = TESSERA_VERSION "/4";
+constexpr const char* kProtocol = TESSERA_VERSION "/5";
 constexpr const char* kByItself = "the reader of meshes is started by tessera itself";
 
 template <class Number>
@@ -50,7 +50,7 @@ std::int64_t parseStart(std::span<const std::string> words) {
 }
 
 std::vector<std::string> requestWords(const ReaderRequest& request) {
-    static_assert(sizeof(ReadOptions) == 2 * sizeof(std::vector<std::string>) + 8,
+    static_assert(sizeof(ReadOptions) == 2 * sizeof(std::vector<std::string>) + sizeof(std::string) + 16,
                   "a new member of ReadOptions needs its word here and in parseRequest");
     std::vector<std::string> words{kProtocol,
                                    std::to_string(request.parent),
@@ -60,7 +60,9 @@ std::vector<std::string> requestWords(const ReaderRequest& request) {
                                    std::to_string(request.options.otherParts.size()),
                                    request.path,
                                    request.task,
-                                   request.body};
+                                   request.body,
+                                   request.options.folder,
+                                   std::to_string(int(request.options.followsLinks))};
     words.insert(words.end(), request.options.otherParts.begin(), request.options.otherParts.end());
     words.insert(words.end(), request.options.fields.begin(), request.options.fields.end());
     return words;
@@ -78,6 +80,8 @@ ReaderRequest parseRequest(std::span<const std::string> words) {
     request.path = words[6];
     request.task = words[7];
     request.body = words[8];
+    request.options.folder = words[9];
+    request.options.followsLinks = parseNumber<int>(words[10]) != 0;
     const std::span<const std::string> rest = words.subspan(kFixedWords);
     if (parts > rest.size()) throw InputError(std::string(kByItself) + "; a part has no name");
     request.options.otherParts.assign(rest.begin(), rest.begin() + std::ptrdiff_t(parts));

@@ -18,6 +18,8 @@
 
 #include "base/sanitizers.h"
 #include "base/timer.h"
+#include "files/named_file.h"
+#include "reader/confine.h"
 #include "reader/mesh_packet.h"
 #include "reader/reader_process.h"
 #include "tessera/error.h"
@@ -181,6 +183,15 @@ void handOver(Packet packet, std::int64_t memoryBytes) {
     std::abort();
 }
 
+/// What the request's files are, and may name.
+std::vector<std::string> readableFiles(const ReaderRequest& request) {
+    if (request.options.followsLinks) return {"/"};
+    std::vector<std::string> files{request.path, folderOf(request.path)};
+    for (const std::string& part : request.options.otherParts) files.push_back(part);
+    if (!request.options.folder.empty()) files.push_back(request.options.folder);
+    return files;
+}
+
 void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
     rlimit before{};
     ::getrlimit(RLIMIT_AS, &before);
@@ -194,6 +205,7 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
     const auto task = std::find_if(tasks.begin(), tasks.end(),
                                    [&](const ReaderTask& known) { return known.name == request.task; });
     if (task == tasks.end()) throw OtherFormatError("this program knows no task " + request.task);
+    confine(readableFiles(request));
     IsolationLimits limits = task->limits(request);
     report(ReaderOutcome::limits, &limits, sizeof limits);
     if (isGiven) limits.memoryBytes = request.memoryBytes;
@@ -207,15 +219,13 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
 }  // namespace
 
 ReaderTask meshTask(MeshReader read) {
-    return {
-        "mesh",
-        [](const ReaderRequest& request) { return defaultLimits(request.path, request.options.otherParts); },
-        [read = std::move(read)](const ReaderRequest& request, const IsolationLimits&,
-                                 const Execution& execution) {
-            MeshFile file = read(request.path, request.options, execution);
-            file.readPeakBytes = peakMemoryBytes();
-            return packMesh(std::move(file));
-        }};
+    return {"mesh", [](const ReaderRequest& request) { return defaultLimits(request.path, request.options); },
+            [read = std::move(read)](const ReaderRequest& request, const IsolationLimits&,
+                                     const Execution& execution) {
+                MeshFile file = read(request.path, request.options, execution);
+                file.readPeakBytes = peakMemoryBytes();
+                return packMesh(std::move(file));
+            }};
 }
 
 int serveReader(std::span<const std::string> arguments, std::span<const ReaderTask> tasks) {

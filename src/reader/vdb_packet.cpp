@@ -105,6 +105,7 @@ BrickTree flatTree(const VdbFile& file, std::span<const BrickKey> keys) {
 
 Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes) {
     auto store = std::make_shared<BrickStore>(std::move(file.store));
+    if (contents == VdbContents::withoutValues) store->surface().clear();
     auto list = std::make_shared<TileList>(listTiles(*store));
     const int channels = contents == VdbContents::all ? store->channels() : 0;
     std::vector<BrickKey> flat;
@@ -130,16 +131,14 @@ Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes) {
     head.put(std::int64_t(list->surface.size()));
     Packet packet;
     packet.head = head.take();
-    const std::size_t surfaceTiles = contents == VdbContents::all ? list->surfaceTiles.size() : 0;
     packet.arrayBytes = std::int64_t(
         flat.size() * sizeof(BrickKey) + list->places.size() * sizeof(TilePlace) +
         (list->extension.size() + list->surface.size()) * sizeof(TileKey) +
         (list->tiles.size() + list->surface.size()) * sizeof(Words) +
-        (list->tiles.size() * std::size_t(channels) + surfaceTiles) * kTilePoints * sizeof(float));
+        (list->tiles.size() * std::size_t(channels) + list->surface.size()) * kTilePoints * sizeof(float));
     const std::size_t tableBytes = store->leafCount() * std::size_t(store->tileCount()) * sizeof(Tile*);
     if (packet.bytes() + std::int64_t(tableBytes) > mostBytes) throw std::bad_alloc();
-    packet.writeArrays = [store, list, channels, surfaceTiles,
-                          flat = std::move(flat)](const PacketSink& sink) {
+    packet.writeArrays = [store, list, channels, flat = std::move(flat)](const PacketSink& sink) {
         give(flat, sink);
         give(list->places, sink);
         give(list->extension, sink);
@@ -155,7 +154,7 @@ Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes) {
         };
         if (channels > 0)
             for (Tile* tile : list->tiles) giveValues(*tile, channels);
-        for (std::size_t i = 0; i < surfaceTiles; ++i) giveValues(*list->surfaceTiles[i], 1);
+        for (Tile* tile : list->surfaceTiles) giveValues(*tile, 1);
     };
     return packet;
 }
@@ -196,8 +195,7 @@ VdbFile unpackVdb(std::span<const std::byte> bytes, const Execution& execution) 
     const auto surfaceCoverage = packet.array<Words>(surfaceTiles, "coverage");
     const std::size_t valuesPerTile = std::size_t(channels) * kTilePoints;
     const auto values = packet.array<float>((leafTiles + moreTiles) * std::int64_t(valuesPerTile), "values");
-    const bool hasSurface = channels > 0 || all == 0;
-    const auto distances = packet.array<float>(hasSurface ? surfaceTiles * kTilePoints : 0, "distances");
+    const auto distances = packet.array<float>(surfaceTiles * kTilePoints, "distances");
     packet.expectEnd();
     if (std::any_of(coverage.begin(), coverage.end(), isEmpty) ||
         std::any_of(surfaceCoverage.begin(), surfaceCoverage.end(), isEmpty))
@@ -227,7 +225,7 @@ VdbFile unpackVdb(std::span<const std::byte> bytes, const Execution& execution) 
     for (std::size_t i = 0; i < extension.size(); ++i)
         fill(place(file.store.extension(), extension[i]), coverage[places.size() + i],
              values.subspan((places.size() + i) * valuesPerTile, valuesPerTile));
-    for (std::size_t i = 0; i < surface.size() && hasSurface; ++i) {
+    for (std::size_t i = 0; i < surface.size(); ++i) {
         const auto of = distances.subspan(i * kTilePoints, kTilePoints);
         Tile& tile = place(file.store.surface(), surface[i]);
         fill(tile, surfaceCoverage[i], of);

@@ -17,8 +17,6 @@
 #include "brick/surface_distance.h"
 #include "files/file_digest.h"
 #include "files/input_file.h"
-#include "files/file_digest.h"
-#include "files/input_file.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
 #include "vdb/openvdb_grids.h"

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Runs tessera on damaged meshes: it must end with exit code 0 or 2, soon, in little memory, with one line of error and no file left behind.
+"""Runs tessera on damaged meshes, .vdb files and logs of bricks: it must end with exit code 0 or 2, soon, in little memory, with one line of error and no file left behind.
 
-usage: run_mutated.py --tessera PROGRAM [--count N] [--seed S] [--first I] [--jobs J] [--keep FOLDER]
+usage: run_mutated.py --tessera PROGRAM [--count N] [--vdb-count N] [--seed S] [--first I] [--jobs J] [--keep FOLDER]
 
 The undamaged files are read first and must be accepted. A mutant that breaks a rule is kept, with the command and what went wrong, in a folder named by
 its seed and index.
@@ -23,9 +23,13 @@ import tempfile
 import time
 
 import mutate_mesh
+import mutate_vdb
 
 LONGEST_S = 10
 LARGEST_BYTES = 2 << 30
+LARGEST_VDB_BYTES = 1 << 30
+LARGEST_PARENT_BYTES = 256 << 20
+LONGEST_LINE_BYTES = 1000
 POLL_S = 0.02
 
 COMMANDS = {
@@ -38,6 +42,21 @@ COMMANDS = {
 }  # fmt: skip
 
 
+# Of .vdb files, and of what --resume keeps: what is damaged has a name by its ending.
+MADE_FROM = {
+    "levels": ["--refine", "element-size", "--max-voxels", "20k"],
+    "flat": ["--refine", "element-size", "--max-voxels", "20k", "--layout", "flat", "--extend", "1"],
+    "half": ["--refine", "uniform", "--resolution", "12", "--half"],
+}
+VDB_COMMANDS = {
+    "info": (["info", "bad.vdb"], None),
+    "verify": (["verify", "mesh.vtu", "bad.vdb", "--quiet"], None),
+    "picture": (["picture", "bad.vdb", "-o", "out.png", "--quiet"], "out.png"),
+    "like": (["resample", "mesh.vtu", "-o", "out.vdb", "--like", "bad.vdb", "--quiet", "--max-voxels", "1M"], "out.vdb"),
+}
+LOG_COMMAND = ["resample", "mesh.vtu", "-o", "out.vdb", "--refine", "error", "--max-error", "5%", "--quiet", "--resume", "bad.log"]
+
+
 @dataclasses.dataclass
 class Run:
     name: str
@@ -48,11 +67,18 @@ class Run:
     stderr: str = ""
 
 
-def tree_bytes(pid):
-    """Resident memory of a process and its children."""
-    total, page = 0, os.sysconf("SC_PAGE_SIZE")
+def own_bytes(pid):
+    """Resident memory of a process."""
     try:
-        total += int(pathlib.Path(f"/proc/{pid}/statm").read_text().split()[1]) * page
+        return int(pathlib.Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, IndexError):
+        return 0  # it has just ended
+
+
+def tree_bytes(pid):
+    """The same, with its children."""
+    total = own_bytes(pid)
+    try:
         for child in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
             total += tree_bytes(int(child))
     except (OSError, IndexError):
@@ -61,15 +87,16 @@ def tree_bytes(pid):
 
 
 def measured(command, folder):
-    """Exit code, seconds, peak bytes of the process and its children, standard error; ends what runs too long or grows too large."""
+    """Exit code, seconds, peak bytes of the process with its children and of it alone, standard error; ends what runs too long or grows too large."""
     begin = time.monotonic()
     with open(folder / ".stderr", "wb") as errors:
         process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
     watch = os.pidfd_open(process.pid)
-    peak = 0
+    peak = own_peak = 0
     try:
         # Some room beyond the limits, so that what is reported is how far a run went and not where it was ended.
         while not select.select([watch], [], [], POLL_S)[0]:
+            own_peak = max(own_peak, own_bytes(process.pid))
             peak = max(peak, tree_bytes(process.pid))
             if time.monotonic() - begin > 2 * LONGEST_S or peak > 1.5 * LARGEST_BYTES:
                 os.killpg(process.pid, signal.SIGKILL)
@@ -81,7 +108,7 @@ def measured(command, folder):
     text = (folder / ".stderr").read_bytes().decode(errors="replace")
     (folder / ".stderr").unlink()
     # The children that were waited for count too: the kernel keeps the largest.
-    return process.returncode, seconds, max(peak, usage.ru_maxrss << 10), text
+    return process.returncode, seconds, max(peak, usage.ru_maxrss << 10), own_peak, text
 
 
 def faults_of(code, seconds, peak, stderr, new_files, output):
@@ -100,9 +127,11 @@ def faults_of(code, seconds, peak, stderr, new_files, output):
         faults.append("a line on stderr that isn't tessera's")
     if len(errors) != (0 if code == 0 else 1):
         faults.append(f"{len(errors)} lines of error")
+    if any(len(line.encode()) > LONGEST_LINE_BYTES for line in errors):
+        faults.append("a line of error of more than 1000 bytes")
     if any(ord(c) < 32 or ord(c) == 127 for line in lines for c in line):
         faults.append("control characters on stderr")
-    expected = {output} if code == 0 else set()
+    expected = {output} if code == 0 and output else set()
     if new_files != expected:
         faults.append(f"files {sorted(new_files)}, expected {sorted(expected)}")
     return faults
@@ -116,7 +145,7 @@ def run_case(program, name, files, mesh, command_name, keep, origin):
     try:
         for file_name, data in files.items():
             (folder / file_name).write_bytes(data)
-        code, seconds, peak, stderr = measured([program, *arguments], folder)
+        code, seconds, peak, _, stderr = measured([program, *arguments], folder)
         new_files = {str(p.relative_to(folder)) for p in folder.rglob("*")} - set(files)
         faults = faults_of(code, seconds, peak, stderr, new_files, output)
         if faults:
@@ -139,6 +168,51 @@ def run_mutant(program, seed, index, keep):
     return run_case(program, f"mutant_{seed}_{index}", files, mesh, command, keep, origin)
 
 
+def make_vdb_files(program):
+    """Undamaged .vdb files, a log and their mesh, by name."""
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-sound-"))
+    try:
+        name = next(name for name, file in mutate_mesh.sound_files().items() if file().extension == ".vtu")
+        (folder / "mesh.vtu").write_bytes(mutate_mesh.sound_files()[name]().serialise())
+        for made, words in MADE_FROM.items():
+            subprocess.run([program, "resample", "mesh.vtu", "-o", f"{made}.vdb", "--quiet", *words], cwd=folder, check=True)
+        subprocess.run([program, *LOG_COMMAND], cwd=folder, check=True)
+        return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "out.vdb"}
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def run_vdb_mutant(program, seed, index, keep, sound):
+    rng = random.Random(f"{seed}:{index}:vdb command")
+    if rng.random() < 0.1 and "bad.log" in sound:
+        made, bad, command, words, output = "bad.log", "bad.log", "resume", LOG_COMMAND, "out.vdb"
+    else:
+        made, bad = rng.choice(list(MADE_FROM)) + ".vdb", "bad.vdb"
+        command = rng.choice(list(VDB_COMMANDS))
+        words, output = VDB_COMMANDS[command]
+    data, how = mutate_vdb.mutant(sound[made], seed, index)
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-mutant-"))
+    name = f"vdb_{seed}_{index}"
+    try:
+        (folder / bad).write_bytes(data)
+        (folder / "mesh.vtu").write_bytes(sound["mesh.vtu"])
+        code, seconds, peak, own_peak, stderr = measured([program, *words], folder)
+        new_files = {path.name for path in folder.iterdir()} - {bad, "mesh.vtu"}
+        faults = faults_of(code, seconds, peak, stderr, new_files, output)
+        if peak > LARGEST_VDB_BYTES:
+            faults.append(f"peak memory {peak >> 20} MiB")
+        if own_peak > LARGEST_PARENT_BYTES:
+            faults.append(f"the program itself took {own_peak >> 20} MiB")
+        if faults:
+            place = keep / name
+            shutil.rmtree(place, ignore_errors=True)
+            shutil.copytree(folder, place)
+            (place / "report.txt").write_text(f"tessera {' '.join(words)}\nfrom {made}, {how}\n{'; '.join(faults)}\n{stderr}")
+        return Run(f"{name} ({command}; {made}, {how})", code, seconds, peak, faults, stderr)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def run_sound(program, name, keep):
     """An undamaged file must be read: otherwise its mutants would test nothing."""
     file = mutate_mesh.sound_files()[name]()
@@ -159,6 +233,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tessera", required=True)
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--vdb-count", type=int, default=0, help="of .vdb files and logs, after those of meshes")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--first", type=int, default=0, help="index of the first mutant")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -181,6 +256,12 @@ def main():
                 print(f"  {len(mutants)} mutants, {sum(bool(r.faults) for r in mutants)} offend", flush=True)
         if mutants:
             summarise(mutants, "mutants")
+        if arguments.vdb_count:
+            sound = make_vdb_files(program)
+            indices = range(arguments.first, arguments.first + arguments.vdb_count)
+            damaged = list(pool.map(lambda i: run_vdb_mutant(program, arguments.seed, i, keep, sound), indices))
+            summarise(damaged, ".vdb files and logs")
+            mutants += damaged
     offending = [run for run in runs + mutants if run.faults]
     for run in offending:
         print(f"FAILED {run.name}: {'; '.join(run.faults)}")

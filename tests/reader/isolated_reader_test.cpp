@@ -18,6 +18,7 @@
 #include "base/sanitizers.h"
 #include "files/input_file.h"
 #include "mesh_test_tools.h"
+#include "reader/confine.h"
 #include "reader/mesh_packet.h"
 #include "reader/reader_limits.h"
 #include "reader/reader_report.h"
@@ -102,7 +103,10 @@ void expectEqual(const MeshFile& a, const MeshFile& b) {
 /// A mesh file that exists; what becomes of it is the child's affair. Afterwards nothing may be left over.
 class IsolatedReaderTest : public testing::Test {
   protected:
-    void SetUp() override { descriptors_ = openDescriptors(); }
+    void SetUp() override {
+        descriptors_ = openDescriptors();
+        ::setenv("TESSERA_TEST_PID_FILE", (path_ + ".pid").c_str(), 1);
+    }
     void TearDown() override {
         EXPECT_EQ(openDescriptors(), descriptors_);
         EXPECT_EQ(::waitpid(-1, nullptr, WNOHANG), -1) << "a child is left";
@@ -421,6 +425,41 @@ TEST_F(IsolatedReaderTest, TheTerminalsSignalsDoNotReachTheChild) {
     });
     EXPECT_THROW(readMeshIsolated(childThat("hang"), path_, {}, kAmple, execution), Cancelled);
     canceller.join();
+}
+
+TEST_F(IsolatedReaderTest, WhatAFileMayNotReadIsRefused) {
+    folder_.write("other.txt", "secret");
+    std::filesystem::create_directory(folder_.file("in"));
+    const auto naming = [&](const std::string& name) {
+        return folder_.write(
+            "in/all.pvtu", "<VTKFile type=\"PUnstructuredGrid\"><PUnstructuredGrid><Piece Source=\"" + name +
+                               "\"/></PUnstructuredGrid></VTKFile>");
+    };
+    const auto message = [&](const std::string& path, const ReadOptions& options) -> std::string {
+        try {
+            readMeshIsolated(childThat("read"), path, options, {}, {});
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "(it was read)";
+    };
+    EXPECT_PRED2(has, message(naming("../mesh.vtu"), {}), "lies outside the folder");
+    ReadOptions follow;
+    follow.followsLinks = true;
+    EXPECT_FALSE(has(message(naming("../mesh.vtu"), follow), "outside"));
+    EXPECT_FALSE(has(message(naming("../other.txt"), follow), "secret"));
+    std::filesystem::create_symlink(path_, folder_.file("in/link.vtu"));
+    EXPECT_PRED2(has, message(naming("link.vtu"), {}), "lies outside the folder");
+    folder_.write("geo", "secret");
+    const std::string pattern =
+        folder_.write("in/a.case", "FORMAT\ntype: ensight gold\nGEOMETRY\nmodel: ../ge*\n");
+    EXPECT_PRED2(has, message(pattern, {}), "lies outside the folder");
+}
+
+TEST_F(IsolatedReaderTest, AProcessThatReadsCanNeitherWriteNorReachOthers) {
+    const Confinement kept = availableConfinement();
+    if (!kept.files || !kept.calls) GTEST_SKIP() << "this system has no Landlock or no seccomp";
+    EXPECT_EQ(messageOf<InputError>("reach"), "nothing");
 }
 
 TEST_F(IsolatedReaderTest, AnAbsentProgramIsAFailureOfTheEnvironment) {

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -78,8 +79,7 @@ const std::map<std::string, std::function<tessera::MeshFile(const std::string& p
     {"abort", [](const std::string&) -> tessera::MeshFile { std::abort(); }},
     {"exit", [](const std::string&) -> tessera::MeshFile { _exit(7); }},
     {"hang",
-     [](const std::string& path) -> tessera::MeshFile {
-         std::ofstream(path + ".pid") << getpid() << std::endl;
+     [](const std::string&) -> tessera::MeshFile {
          while (true) pause();
      }},
     {"spin",
@@ -109,6 +109,17 @@ const std::map<std::string, std::function<tessera::MeshFile(const std::string& p
          std::puts("to standard output");
          std::fputs("to standard error\n", stderr);
          throw tessera::InputError("printed");
+     }},
+    {"reach",
+     [](const std::string& path) -> tessera::MeshFile {
+         std::string reached;
+         if (open((path + ".new").c_str(), O_WRONLY | O_CREAT, 0600) >= 0) reached += "a new file ";
+         if (open(path.c_str(), O_WRONLY) >= 0) reached += "the mesh ";
+         if (open("/etc/passwd", O_RDONLY) >= 0) reached += "another file ";
+         if (socket(AF_INET, SOCK_STREAM, 0) >= 0) reached += "the network ";
+         if (open(path.c_str(), O_RDONLY) < 0) reached += "not even the mesh ";
+         execl("/bin/true", "true", nullptr);
+         throw tessera::InputError(reached.empty() ? "nothing" : reached);
      }},
     {"descriptors",
      [](const std::string&) -> tessera::MeshFile {
@@ -154,6 +165,9 @@ int main(int argc, char** argv) {
         _exit(0);
     }
     const std::vector<std::string> words(argv + 2, argv + argc);
+    // While it serves it can't write a file.
+    if (const char* place = std::getenv("TESSERA_TEST_PID_FILE"); place && mode == "hang")
+        std::ofstream(place) << getpid() << std::endl;
     const auto serve = [&](tessera::MeshReader read) {
         std::vector<tessera::ReaderTask> tasks = tessera::vdbTasks();
         tasks.push_back(tessera::meshTask(std::move(read)));

@@ -1,0 +1,25 @@
+#include "files/named_file.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "tessera/error.h"
+
+namespace tessera {
+
+void checkInFolder(const std::string& folder, const std::string& by, const std::string& named) {
+    namespace fs = std::filesystem;
+    std::error_code error;
+    const fs::path root = fs::weakly_canonical(folder, error), place = fs::weakly_canonical(named, error);
+    if (!error && std::mismatch(root.begin(), root.end(), place.begin(), place.end()).first == root.end())
+        return;
+    throw InputError(by + ": names " + named + ", which lies outside the folder " + folder +
+                     "; --follow-links lets files name others anywhere");
+}
+
+std::string folderOf(const std::string& path) {
+    const std::string folder = std::filesystem::path(path).parent_path().string();
+    return folder.empty() ? "." : folder;
+}
+
+}  // namespace tessera

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+namespace tessera {
+
+/// Throws InputError when a file that another one names lies neither in `folder` nor below it, by where
+/// symbolic links lead. @param by what names it.
+void checkInFolder(const std::string& folder, const std::string& by, const std::string& named);
+
+/// The folder that a file lies in.
+std::string folderOf(const std::string& path);
+
+}  // namespace tessera
