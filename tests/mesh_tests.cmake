@@ -12,7 +12,7 @@ if(TESSERA_BUILD_IO)
   tessera_test(repair_data_test FOLDER mesh_files LINK reader)
   tessera_program(misbehaving_reader SOURCES reader/misbehaving_reader.cpp LINK reader)
   tessera_test(isolated_reader_test FOLDER reader LINK reader)
-  tessera_test(solver_formats_test FOLDER mesh_files LINK reader PRIVATE_LINK VTK::exodusII VTK::cgns fmt::fmt)
+  tessera_test(solver_formats_test FOLDER mesh_files LINK reader PRIVATE_LINK VTK::exodusII VTK::hdf5 VTK::cgns fmt::fmt)
   foreach(name isolated_reader_test solver_formats_test)
     target_compile_definitions(${name} PRIVATE TESSERA_MISBEHAVING_READER="$<TARGET_FILE:misbehaving_reader>"
       TESSERA_QUICK_READER="$<TARGET_FILE:tessera_read_mesh>")

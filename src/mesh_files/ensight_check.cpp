@@ -47,10 +47,15 @@ std::vector<std::filesystem::path> filesLike(const std::filesystem::path& folder
     return files;
 }
 
-std::vector<std::filesystem::path> filesNamed(const std::string& casePath, const std::string& name) {
+std::vector<std::filesystem::path> filesNamed(const std::string& casePath, const std::string& name,
+                                              const std::optional<std::string>& folder) {
     const std::filesystem::path path = std::filesystem::path(casePath).parent_path() / name;
     const std::string pattern = path.filename().string();
     if (pattern.find('*') == std::string::npos) return {path};
+    // What lies elsewhere can't be listed by a process that has given that up.
+    std::error_code error;
+    if (folder && std::filesystem::is_directory(path.parent_path(), error))
+        checkInFolder(*folder, casePath, path.parent_path().string());
     return filesLike(path.parent_path(), pattern);
 }
 
@@ -94,7 +99,7 @@ EnSightCase checkEnSightCase(const std::string& path, const std::optional<std::s
         rest.remove_prefix(std::min(line.size() + 1, rest.size()));
         const std::string name = lastWord(line);
         if (name.empty()) continue;
-        for (const std::filesystem::path& named : filesNamed(path, name)) {
+        for (const std::filesystem::path& named : filesNamed(path, name, folder)) {
             const std::int64_t bytes = checkedSize(path, named);
             if (bytes > 0 && folder) checkInFolder(*folder, path, named.string());
             found.bytes += bytes;

@@ -1,32 +1,24 @@
 #include "reader/confine.h"
 
 #include <fcntl.h>
-#include <linux/audit.h>
-#include <linux/filter.h>
 #include <linux/landlock.h>
-#include <linux/seccomp.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
+#ifdef TESSERA_SECCOMP
+#include <sched.h>
+#include <seccomp.h>
+#endif
 
 #include <array>
 #include <cerrno>
-#include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <initializer_list>
 
 namespace tessera {
 
 namespace {
-
-#if defined(__x86_64__)
-constexpr std::uint32_t kArchitecture = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-constexpr std::uint32_t kArchitecture = AUDIT_ARCH_AARCH64;
-#else
-constexpr std::uint32_t kArchitecture = 0;  // no filter
-#endif
 
 constexpr std::uint64_t kReadFolder = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 // Rights that the first version of Landlock knows, and those that came with the second and the third:
@@ -65,57 +57,67 @@ void confineFiles(std::span<const std::string> readable) {
     ::close(rules);
 }
 
-/// Calls that no reader of files needs.
-constexpr std::array kRefusedCalls{SYS_socket,
-                                   SYS_socketpair,
-                                   SYS_connect,
-                                   SYS_bind,
-                                   SYS_listen,
-                                   SYS_execve,
-                                   SYS_execveat,
-                                   SYS_ptrace,
-                                   SYS_process_vm_readv,
-                                   SYS_process_vm_writev,
-                                   SYS_io_uring_setup,
-                                   SYS_bpf,
-                                   SYS_mount,
-                                   SYS_unshare,
-                                   SYS_setns,
-                                   SYS_keyctl,
-                                   SYS_add_key,
-                                   SYS_perf_event_open,
-                                   SYS_userfaultfd};
+#ifdef TESSERA_SECCOMP
+/// All that reading files, memory, threads and the clock need, in any version of the C library. What isn't
+/// here isn't there (ENOSYS): the network, other programs and processes, the names and rights of files.
+constexpr std::array kCalls{
+    // files that are open, and looking at those that aren't
+    SCMP_SYS(read), SCMP_SYS(readv), SCMP_SYS(pread64), SCMP_SYS(preadv), SCMP_SYS(write), SCMP_SYS(writev),
+    SCMP_SYS(close), SCMP_SYS(lseek), SCMP_SYS(fstat), SCMP_SYS(newfstatat), SCMP_SYS(stat), SCMP_SYS(lstat),
+    SCMP_SYS(statx), SCMP_SYS(statfs), SCMP_SYS(fstatfs), SCMP_SYS(access), SCMP_SYS(faccessat),
+    SCMP_SYS(faccessat2), SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(getdents64), SCMP_SYS(getcwd),
+    SCMP_SYS(fcntl), SCMP_SYS(flock), SCMP_SYS(fadvise64), SCMP_SYS(ftruncate), SCMP_SYS(dup), SCMP_SYS(poll),
+    SCMP_SYS(ppoll),
+    // memory
+    SCMP_SYS(brk), SCMP_SYS(mmap), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(mprotect), SCMP_SYS(madvise),
+    SCMP_SYS(mbind), SCMP_SYS(get_mempolicy),
+    // threads and signals of this process
+    SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(get_robust_list), SCMP_SYS(set_tid_address),
+    SCMP_SYS(rseq), SCMP_SYS(arch_prctl), SCMP_SYS(prctl), SCMP_SYS(exit), SCMP_SYS(exit_group),
+    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
+    SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(gettid), SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity),
+    SCMP_SYS(sched_getparam), SCMP_SYS(sched_getscheduler), SCMP_SYS(restart_syscall), SCMP_SYS(membarrier),
+    // what there is of time, memory and processors; who this is
+    SCMP_SYS(clock_gettime), SCMP_SYS(clock_getres), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
+    SCMP_SYS(gettimeofday), SCMP_SYS(time), SCMP_SYS(times), SCMP_SYS(getrusage), SCMP_SYS(getrlimit),
+    SCMP_SYS(setrlimit), SCMP_SYS(sysinfo), SCMP_SYS(uname), SCMP_SYS(getcpu), SCMP_SYS(getrandom),
+    SCMP_SYS(getuid), SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getegid)};
 
 void confineCalls() {
-    if (kArchitecture == 0) return;
-    std::vector<sock_filter> filter{
-        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, arch)),
-        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, kArchitecture, 1, 0),
-        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
-        BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+    const scmp_filter_ctx filter = ::seccomp_init(SCMP_ACT_ERRNO(ENOSYS));
+    if (!filter) return;
+    bool isWhole = true;
+    const auto allow = [&](int call, std::initializer_list<scmp_arg_cmp> where) {
+        isWhole &= ::seccomp_rule_add_array(filter, SCMP_ACT_ALLOW, call, unsigned(where.size()),
+                                            where.begin()) == 0;
     };
-#if defined(__x86_64__)
-    // Numbers of the x32 interface are calls of their own.
-    filter.push_back(BPF_JUMP(BPF_JMP | BPF_JGE | BPF_K, 0x40000000, 0, 1));
-    filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS));
-#endif
-    for (const long call : kRefusedCalls) {
-        filter.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, std::uint32_t(call), 0, 1));
-        filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM));
-    }
-    filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
-    sock_fprog program{};
-    program.len = static_cast<unsigned short>(filter.size());
-    program.filter = filter.data();
-    ::syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, 0, &program);
+    for (const int call : kCalls) allow(call, {});
+    // Opening to read; threads, no processes; its own signals and limits.
+    constexpr scmp_datum_t kWays = O_ACCMODE | O_CREAT | O_TRUNC;
+    allow(SCMP_SYS(open), {SCMP_A1(SCMP_CMP_MASKED_EQ, kWays, O_RDONLY)});
+    allow(SCMP_SYS(openat), {SCMP_A2(SCMP_CMP_MASKED_EQ, kWays, O_RDONLY)});
+    allow(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)});
+    allow(SCMP_SYS(tgkill), {SCMP_A0(SCMP_CMP_EQ, scmp_datum_t(::getpid()))});
+    allow(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0)});
+    if (isWhole) ::seccomp_load(filter);
+    ::seccomp_release(filter);
 }
+
+bool hasFilter() {
+    return ::seccomp_api_get() >= 2;
+}
+#else
+void confineCalls() {}
+
+bool hasFilter() {
+    return false;
+}
+#endif
 
 }  // namespace
 
 Confinement availableConfinement() {
-    const std::uint32_t action = SECCOMP_RET_ERRNO;
-    return {landlockVersion() >= 1,
-            kArchitecture != 0 && ::syscall(SYS_seccomp, SECCOMP_GET_ACTION_AVAIL, 0, &action) == 0};
+    return {landlockVersion() >= 1, hasFilter()};
 }
 
 void confine(std::span<const std::string> readable) {

@@ -6,6 +6,7 @@ import struct
 UUID_AT, UUID_BYTES = 21, 36
 WORD = (1 << 64) - 1
 SIZES = [0, 1, -1, 1 << 31, (1 << 31) - 1, 1 << 40, (1 << 63) - 1, -(1 << 63), 0x7FFFFFF0]
+SMALL_SIZES = [size for size in SIZES if -(1 << 31) <= size < 1 << 31]
 
 
 def rotated(word, bits):
@@ -49,7 +50,7 @@ def mutant(sound, seed, index):
         how = "size"
         for _ in range(rng.choice([1, 1, 2])):
             at = rng.randrange(first, len(data))
-            put(data, at, struct.pack("<q", rng.choice(SIZES)) if rng.random() < 0.5 else struct.pack("<i", rng.choice(SIZES[:5] + [0x7FFFFFF0])))
+            put(data, at, struct.pack("<q", rng.choice(SIZES)) if rng.random() < 0.5 else struct.pack("<i", rng.choice(SMALL_SIZES)))
     elif rng.random() < 0.2:
         how = "run"
         put(data, rng.randrange(first, len(data)), rng.randbytes(rng.choice([4, 16, 64])))

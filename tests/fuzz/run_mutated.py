@@ -44,8 +44,8 @@ COMMANDS = {
 
 # Of .vdb files, and of what --resume keeps: what is damaged has a name by its ending.
 MADE_FROM = {
-    "levels": ["--refine", "element-size", "--max-voxels", "20k"],
-    "flat": ["--refine", "element-size", "--max-voxels", "20k", "--layout", "flat", "--extend", "1"],
+    "levels": ["--refine", "error", "--max-error", "5%", "--max-voxels", "300k", "--brick-size", "8"],
+    "flat": ["--refine", "uniform", "--resolution", "16", "--layout", "flat", "--extend", "1"],
     "half": ["--refine", "uniform", "--resolution", "12", "--half"],
 }
 VDB_COMMANDS = {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <vtk_cgns.h>
 #include <vtk_exodusII.h>
+#include <vtk_hdf5.h>
 #include VTK_CGNS(cgnslib.h)
 
 #include <array>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "mesh/field_range.h"
+#include "mesh_files/open_check.h"
 #include "mesh_files/read_mesh.h"
 #include "mesh_test_tools.h"
 #include "reader/isolated_reader.h"
@@ -564,6 +566,65 @@ TEST(SolverFormats, OpenFoamInParts) {
     EXPECT_PRED2(holds, whole.statistics.warnings[0], "times up to 2.5");
     std::filesystem::remove(folder.file("processor0/2.5"));
     EXPECT_TRUE(readMesh(path, {}, {}).statistics.warnings.empty());
+}
+
+/// A group of HDF5 with a dataset, and whatever `add` puts beside it.
+std::string writeHdf5(const TemporaryFolder& folder, const std::string& name,
+                      const std::function<void(hid_t file, hid_t space)>& add) {
+    const std::string path = folder.file(name);
+    const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+    const hsize_t length = 6;
+    const hid_t space = H5Screate_simple(1, &length, nullptr);
+    const hid_t group = H5Gcreate2(file, "group", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    H5Dclose(H5Dcreate2(group, "own", H5T_NATIVE_CHAR, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+    add(group, space);
+    H5Gclose(group);
+    H5Sclose(space);
+    H5Fclose(file);
+    return path;
+}
+
+TEST(SolverFormats, FilesThatReadOthersAreRefused) {
+    const TemporaryFolder folder;
+    folder.write("other", "secret");
+    const auto refusal = [](const std::string& path) -> std::string {
+        try {
+            refuseLinks(path);
+        } catch (const InputError& error) {
+            return error.what();
+        }
+        return "";
+    };
+    EXPECT_EQ(refusal(writeHdf5(folder, "own.ex2",
+                                [](hid_t group, hid_t) {
+                                    H5Lcreate_soft("/group/own", group, "soft", H5P_DEFAULT, H5P_DEFAULT);
+                                })),
+              "");
+    const std::string linked = writeHdf5(folder, "linked.ex2", [](hid_t group, hid_t) {
+        H5Lcreate_external("own.ex2", "/group/own", group, "there", H5P_DEFAULT, H5P_DEFAULT);
+    });
+    EXPECT_NE(refusal(linked).find("a link to another file, group/there"), std::string::npos);
+    const std::string stored = writeHdf5(folder, "stored.cgns", [&](hid_t group, hid_t space) {
+        const hid_t plan = H5Pcreate(H5P_DATASET_CREATE);
+        H5Pset_external(plan, folder.file("other").c_str(), 0, 6);
+        H5Dclose(H5Dcreate2(group, "there", H5T_NATIVE_CHAR, space, H5P_DEFAULT, plan, H5P_DEFAULT));
+        H5Pclose(plan);
+    });
+    EXPECT_NE(refusal(stored).find("values in another file, of group/there"), std::string::npos);
+    for (const int type : {CG_FILE_ADF, CG_FILE_HDF5}) {
+        const std::string path = folder.file("linked.cgns");
+        int file = 0, base = 0;
+        std::filesystem::remove(path);
+        cg_set_file_type(type);
+        ASSERT_EQ(cg_open(path.c_str(), CG_MODE_WRITE, &file), 0);
+        ASSERT_EQ(cg_base_write(file, "Base", 3, 3, &base), 0);
+        ASSERT_EQ(cg_goto(file, base, "end"), 0);
+        ASSERT_EQ(cg_link_write("Grid", "other.cgns", "/Base/Grid"), 0);
+        cg_close(file);
+        EXPECT_NE(refusal(path).find("a link to another file"), std::string::npos) << type;
+        EXPECT_THROW(readMesh(path, {}, {}), InputError);
+    }
+    cg_set_file_type(CG_FILE_NONE);
 }
 
 }  // namespace
