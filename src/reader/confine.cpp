@@ -50,7 +50,7 @@ void confineFiles(std::span<const std::string> readable) {
     const int rules = int(::syscall(SYS_landlock_create_ruleset, &handled, sizeof handled, 0));
     if (rules < 0) return;
     for (const char* folder : {"/usr", "/lib", "/lib64", "/etc/ld.so.cache", "/proc/self", "/proc/meminfo",
-                               "/sys/devices/system", "/dev/null", "/dev/urandom"})
+                               "/sys/devices/system", "/sys/kernel/mm", "/dev/null", "/dev/urandom"})
         allowReading(rules, folder);
     for (const std::string& path : readable) allowReading(rules, path);
     ::syscall(SYS_landlock_restrict_self, rules, 0);

@@ -107,6 +107,11 @@ void IsolatedReading::failWithGarbage(const std::string& why) const {
 
 void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
     if (end.byProcessorLimit) throw IoError(name_ + ": the reader " + end.words);
+    // Libraries crash where memory ends, too.
+    if (end.bySignal && given_.memoryBytes > 0 && given_.memoryBytes < usual_.memoryBytes)
+        throw InputError(name_ + ": the reader " + end.words + "; the limit on memory given, " +
+                         inMiB(given_.memoryBytes) + ", may be too low: for a file like this it would be " +
+                         inMiB(usual_.memoryBytes));
     throw InputError(name_ + ": the reader " + end.words + kSuspicion);
 }
 

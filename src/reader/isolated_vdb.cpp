@@ -1,5 +1,7 @@
 #include "reader/isolated_vdb.h"
 
+#include <tbb/global_control.h>
+
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -95,6 +97,17 @@ Packet packLattice(const FixedFrame& frame) {
     return packet;
 }
 
+/// The same task, in which OpenVDB has no more threads than those that its memory allows.
+ReaderTask inThreads(ReaderTask task) {
+    task.run = [run = std::move(task.run)](const ReaderRequest& request, const IsolationLimits& limits,
+                                           const Execution& execution) {
+        const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                          std::size_t(execution.threads));
+        return run(request, limits, execution);
+    };
+    return task;
+}
+
 }  // namespace
 
 VdbFile readVdbIsolated(const IsolatedReader& reader, const std::string& path, VdbContents contents,
@@ -145,11 +158,11 @@ GridSampler isolatedGridSampler(const IsolatedReader& reader, const IsolationLim
 std::vector<ReaderTask> vdbTasks() {
     const auto limits = [](const ReaderRequest& request) { return limitsOfVdb(request.path); };
     const auto reads = [&](const char* name, VdbContents contents) {
-        return ReaderTask{
-            name, limits,
-            [contents](const ReaderRequest& request, const IsolationLimits& bounds, const Execution&) {
-                return packVdb(readVdb(request.path), contents, bounds.memoryBytes / kHandedOverShare);
-            }};
+        return inThreads(
+            {name, limits,
+             [contents](const ReaderRequest& request, const IsolationLimits& bounds, const Execution&) {
+                 return packVdb(readVdb(request.path), contents, bounds.memoryBytes / kHandedOverShare);
+             }});
     };
     const auto withPlaces = [](const ReaderRequest& request) {
         IsolationLimits bounds = limitsOfVdb(request.path);
@@ -157,16 +170,15 @@ std::vector<ReaderTask> vdbTasks() {
         bounds.memoryBytes += 4 * std::int64_t(request.body.size());
         return bounds;
     };
-    return {
-        reads(kWhole, VdbContents::all),
-        reads(kWithoutValues, VdbContents::withoutValues),
-        {kLattice, limits,
-         [](const ReaderRequest& request, const IsolationLimits&, const Execution&) {
-             return packLattice(readVdbLattice(request.path));
-         }},
-        {kSamples, withPlaces, [](const ReaderRequest& request, const IsolationLimits&, const Execution&) {
-             return answerQuestions(request);
-         }}};
+    return {reads(kWhole, VdbContents::all), reads(kWithoutValues, VdbContents::withoutValues),
+            inThreads({kLattice, limits,
+                       [](const ReaderRequest& request, const IsolationLimits&, const Execution&) {
+                           return packLattice(readVdbLattice(request.path));
+                       }}),
+            inThreads({kSamples, withPlaces,
+                       [](const ReaderRequest& request, const IsolationLimits&, const Execution&) {
+                           return answerQuestions(request);
+                       }})};
 }
 
 }  // namespace tessera

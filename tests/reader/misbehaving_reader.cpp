@@ -118,6 +118,12 @@ const std::map<std::string, std::function<tessera::MeshFile(const std::string& p
          if (open("/etc/passwd", O_RDONLY) >= 0) reached += "another file ";
          if (socket(AF_INET, SOCK_STREAM, 0) >= 0) reached += "the network ";
          if (open(path.c_str(), O_RDONLY) < 0) reached += "not even the mesh ";
+         if (rename(path.c_str(), (path + ".new").c_str()) == 0) reached += "the mesh's name ";
+         if (kill(getppid(), 0) == 0) reached += "its parent ";
+         if (const pid_t child = fork(); child >= 0) {
+             if (child == 0) _exit(0);
+             reached += "a process of its own ";
+         }
          execl("/bin/true", "true", nullptr);
          throw tessera::InputError(reached.empty() ? "nothing" : reached);
      }},
