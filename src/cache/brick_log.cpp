@@ -1,14 +1,17 @@
 #include "cache/brick_log.h"
 
-#include <blosc.h>
 #include <fcntl.h>
+#include <lz4.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
+#include <climits>
+#include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -23,13 +26,16 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr char kFirstLine[] = "tessera brick log 1\n";
+constexpr char kFirstLine[] = "tessera brick log 2\n";
 constexpr std::int32_t kMark = 0x52425354;  // "TSBR"
 constexpr std::size_t kDigestBytes = 36;
-/// More than any brick has: 65^3 points of hundreds of channels.
-constexpr std::int32_t kMostBytes = 1 << 30;
 
-using Head = std::array<std::int32_t, 7>;  // mark, depth, x, y, z, bytes unpacked, bytes packed
+using Head = std::array<std::int32_t, 6>;  // mark, depth, x, y, z, bytes packed
+
+/// Of a brick's samples unpacked: values and coverage.
+std::size_t bytesOf(std::size_t pointCount, int channels) {
+    return pointCount * (std::size_t(channels) * sizeof(float) + 1);
+}
 
 std::string reason() {
     return std::strerror(errno);
@@ -76,9 +82,21 @@ void writeAt(int descriptor, const std::string& path, std::int64_t offset, const
 }
 
 /// Of a record whose head was read: false for one that no log has.
-bool isPlausible(const Head& head) {
+bool isPlausible(const Head& head, std::size_t mostBytes) {
     return head[0] == kMark && head[1] >= 0 && head[1] <= GrowingTree::kDeepest.halvings() && head[5] > 0 &&
-           head[5] <= kMostBytes && head[6] > 0 && head[6] <= kMostBytes;
+           std::size_t(head[5]) <= mostBytes;
+}
+
+/// The first bytes of all numbers, then their second ones and so on, as they pack better; or back again.
+void shuffle(std::span<const float> values, char* planes) {
+    const char* bytes = reinterpret_cast<const char*>(values.data());
+    for (std::size_t b = 0; b < sizeof(float); ++b)
+        for (std::size_t i = 0; i < values.size(); ++i) *planes++ = bytes[i * sizeof(float) + b];
+}
+void unshuffle(const char* planes, std::span<float> values) {
+    char* bytes = reinterpret_cast<char*>(values.data());
+    for (std::size_t b = 0; b < sizeof(float); ++b)
+        for (std::size_t i = 0; i < values.size(); ++i) bytes[i * sizeof(float) + b] = *planes++;
 }
 
 }  // namespace
@@ -105,7 +123,11 @@ std::string BrickLog::describe(const TetMesh& mesh, std::span<const int> fields,
         .dump();
 }
 
-BrickLog::BrickLog(const std::string& path, const std::string& description) : path_(path) {
+BrickLog::BrickLog(const std::string& path, const std::string& description, int brickCells, int channels)
+    : path_(path), channels_(channels), pointCount_(std::size_t(std::pow(brickCells + 1, 3))) {
+    const int most = LZ4_compressBound(int(std::min(bytesOf(pointCount_, channels), std::size_t(INT_MAX))));
+    if (most <= 0) throw InputError(path + ": a brick is too large for a log");
+    packedBytes_ = std::size_t(most);
     descriptor_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (descriptor_ < 0) throw IoError(path + ": can't be opened: " + reason());
     try {
@@ -124,8 +146,10 @@ BrickLog::BrickLog(const std::string& path, const std::string& description) : pa
         there.resize(readAt(descriptor_, path_, 0, there.data(), there.size()));
         if (!there.starts_with(kFirstLine)) throw InputError(path + ": no log of bricks");
         if (there != head)
-            throw InputError(path +
-                             ": a log of another mesh, other fields, another lattice or another algorithm");
+            throw InputError(
+                path +
+                ": a log of another mesh, other fields, another lattice, another algorithm or another "
+                "version of tessera");
         scan(std::int64_t(head.size()));
     } catch (...) {
         ::close(descriptor_);
@@ -145,9 +169,10 @@ void BrickLog::scan(std::int64_t from) {
     std::vector<char> record;
     while (true) {
         Head head{};
-        if (readAt(descriptor_, path_, end_, head.data(), sizeof head) < sizeof head || !isPlausible(head))
+        if (readAt(descriptor_, path_, end_, head.data(), sizeof head) < sizeof head ||
+            !isPlausible(head, packedBytes_))
             break;
-        const std::size_t bytes = sizeof head + std::size_t(head[6]) + kDigestBytes;
+        const std::size_t bytes = sizeof head + std::size_t(head[5]) + kDigestBytes;
         if (end_ + std::int64_t(bytes) > status.st_size) break;
         record.resize(bytes);
         if (readAt(descriptor_, path_, end_, record.data(), bytes) < bytes) break;
@@ -181,46 +206,43 @@ std::shared_ptr<const Block> BrickLog::read(const DepthKey& key, const Lattice& 
     }
     std::vector<char> record(std::size_t(place.bytes));
     const auto damaged = [&] {
-        return IoError(path_ + ": damaged: the brick at byte " + std::to_string(place.offset));
+        return InputError(path_ + ": damaged: the brick at byte " + std::to_string(place.offset));
     };
     if (readAt(descriptor_, path_, place.offset, record.data(), record.size()) < record.size())
         throw damaged();
     if (digestOf(record.data(), record.size() - kDigestBytes) !=
         std::string(record.end() - std::ptrdiff_t(kDigestBytes), record.end()))
         throw damaged();
-    Head head{};
-    std::memcpy(head.data(), record.data(), sizeof head);
     auto block = std::make_shared<Block>();
     block->lattice = lattice;
     block->box = box;
-    const std::size_t count = block->count(), raw = std::size_t(head[5]);
-    if (raw < count || (raw - count) % (count * sizeof(float)) != 0) throw damaged();
-    block->channels = int((raw - count) / (count * sizeof(float)));
-    std::vector<char> unpacked(raw);
-    if (blosc_decompress_ctx(record.data() + sizeof head, unpacked.data(), raw, 1) != head[5])
+    block->channels = channels_;
+    TESSERA_CHECK(block->count() == pointCount_, "a brick of another size");
+    // The digest tells damage alone: nothing here may be believed.
+    std::vector<char> unpacked(bytesOf(pointCount_, channels_));
+    const int packed = int(record.size() - sizeof(Head) - kDigestBytes);
+    if (LZ4_decompress_safe(record.data() + sizeof(Head), unpacked.data(), packed, int(unpacked.size())) !=
+        int(unpacked.size()))
         throw damaged();
-    block->values.resize((raw - count) / sizeof(float));
-    block->coverage.resize(count);
-    std::memcpy(block->values.data(), unpacked.data(), raw - count);
-    std::memcpy(block->coverage.data(), unpacked.data() + (raw - count), count);
+    block->values.resize(pointCount_ * std::size_t(channels_));
+    unshuffle(unpacked.data(), block->values);
+    block->coverage.assign(unpacked.end() - std::ptrdiff_t(pointCount_), unpacked.end());
+    if (std::any_of(block->coverage.begin(), block->coverage.end(), [](int covered) { return covered > 1; }))
+        throw damaged();
     return block;
 }
 
 void BrickLog::append(const DepthKey& key, const Block& samples) {
     if (contains(key)) return;
-    const std::size_t valueBytes = samples.values.size() * sizeof(float);
-    std::vector<char> raw(valueBytes + samples.coverage.size());
-    TESSERA_CHECK(raw.size() <= std::size_t(kMostBytes), "a brick is too large for a log");
-    std::memcpy(raw.data(), samples.values.data(), valueBytes);
-    std::memcpy(raw.data() + valueBytes, samples.coverage.data(), samples.coverage.size());
-    std::vector<char> record(sizeof(Head) + raw.size() + BLOSC_MAX_OVERHEAD + kDigestBytes);
-    constexpr int kLevel = 5;
+    TESSERA_CHECK(samples.count() == pointCount_ && samples.channels == channels_, "a brick of another size");
+    std::vector<char> raw(bytesOf(pointCount_, channels_));
+    shuffle(samples.values, raw.data());
+    std::copy(samples.coverage.begin(), samples.coverage.end(), raw.end() - std::ptrdiff_t(pointCount_));
+    std::vector<char> record(sizeof(Head) + packedBytes_ + kDigestBytes);
     const int packed =
-        blosc_compress_ctx(kLevel, BLOSC_SHUFFLE, sizeof(float), raw.size(), raw.data(),
-                           record.data() + sizeof(Head), raw.size() + BLOSC_MAX_OVERHEAD, "lz4", 0, 1);
-    TESSERA_CHECK(packed > 0, "Blosc can't pack a brick");
-    const Head head{kMark,       key.depth.halvings(),     key.index.x, key.index.y,
-                    key.index.z, std::int32_t(raw.size()), packed};
+        LZ4_compress_default(raw.data(), record.data() + sizeof(Head), int(raw.size()), int(packedBytes_));
+    TESSERA_CHECK(packed > 0, "LZ4 can't pack a brick");
+    const Head head{kMark, key.depth.halvings(), key.index.x, key.index.y, key.index.z, packed};
     std::memcpy(record.data(), head.data(), sizeof head);
     const std::size_t bytes = sizeof head + std::size_t(packed);
     const std::string digest = digestOf(record.data(), bytes);

@@ -61,7 +61,8 @@ std::shared_ptr<BrickArchive> openLog(const TetMesh& mesh, const StepPlan& plan,
     if (plan.refine.bind.format != SampleFormat::r32f)
         algorithm += fmt::format(" {}", nameOf(plan.refine.bind.format));
     return std::make_shared<BrickLog>(
-        path, BrickLog::describe(mesh, plan.selection.fields, algorithm, chooseFrame(box, plan.refine)));
+        path, BrickLog::describe(mesh, plan.selection.fields, algorithm, chooseFrame(box, plan.refine)),
+        plan.refine.brickCells, plan.selection.channels);
 }
 
 void sample(const TetMesh& mesh, const StepPlan& plan, const Resampler& resampler, const std::string& log,

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <random>
 
 #include "brick_test_meshes.h"
+#include "files/file_digest.h"
 #include "schedule/brick_scheduler.h"
 #include "software/software_resampler.h"
 #include "tessera/error.h"
@@ -52,14 +54,14 @@ class CacheTest : public testing::Test {
 
 TEST_F(CacheTest, ALogGivesBackTheSameBits) {
     {
-        BrickLog log(path_, "a");
+        BrickLog log(path_, "a", 8, 2);
         for (int n = 0; n < 20; ++n) log.append(key(n), block(key(n), unsigned(n)));
         for (int n = 0; n < 20; ++n) expectBlock(log, n);
         EXPECT_FALSE(log.contains(key(20)));
         // Nobody else writes meanwhile.
-        EXPECT_THROW(BrickLog(path_, "a"), IoError);
+        EXPECT_THROW(BrickLog(path_, "a", 8, 2), IoError);
     }
-    const BrickLog again(path_, "a");
+    const BrickLog again(path_, "a", 8, 2);
     EXPECT_EQ(again.brickCount(), 20u);
     for (int n = 0; n < 20; ++n) expectBlock(again, n);
 }
@@ -67,7 +69,7 @@ TEST_F(CacheTest, ALogGivesBackTheSameBits) {
 // Cut off anywhere, or with a byte changed: all bricks before that place are there, and the log goes on.
 TEST_F(CacheTest, WhatADamagedLogStillHoldsIsThere) {
     {
-        BrickLog log(path_, "a");
+        BrickLog log(path_, "a", 8, 2);
         for (int n = 0; n < 6; ++n) log.append(key(n), block(key(n), unsigned(n)));
     }
     std::ifstream file(path_, std::ios::binary);
@@ -82,7 +84,7 @@ TEST_F(CacheTest, WhatADamagedLogStillHoldsIsThere) {
         else
             damaged[at] = char(damaged[at] ^ 0x10);
         std::ofstream(path_, std::ios::binary) << damaged;
-        BrickLog log(path_, "a");
+        BrickLog log(path_, "a", 8, 2);
         const std::size_t there = log.brickCount();
         for (std::size_t n = 0; n < there; ++n) expectBlock(log, int(n));
         for (int n = 0; n < 6; ++n) log.append(key(n), block(key(n), unsigned(n)));
@@ -94,16 +96,48 @@ TEST_F(CacheTest, WhatADamagedLogStillHoldsIsThere) {
     EXPECT_GE(most, 4u);
 }
 
+// A digest tells damage, not what is safe: with one that fits, a brick is refused or as large as any other.
+TEST_F(CacheTest, WhatADigestVouchesForIsNotBelieved) {
+    constexpr std::size_t kHeadBytes = 24, kDigestBytes = 36;
+    { BrickLog(path_, "a", 8, 2).append(key(1), block(key(1), 1)); }
+    std::ifstream file(path_, std::ios::binary);
+    const std::string whole((std::istreambuf_iterator<char>(file)), {});
+    const std::size_t record = whole.find('\n', whole.find('\n') + 1) + 1;
+    const std::size_t packed = record + kHeadBytes, end = whole.size() - kDigestBytes;
+    std::mt19937 random(5);
+    int refused = 0;
+    for (int trial = 0; trial < 500; ++trial) {
+        std::string damaged = whole;
+        for (unsigned n = 1 + random() % 4; n > 0; --n)
+            damaged[packed + random() % (end - packed)] = char(random());
+        FileDigest digest;
+        digest.update(damaged.data() + record, end - record);
+        damaged.replace(end, kDigestBytes, digest.uuid());
+        std::ofstream(path_, std::ios::binary) << damaged;
+        const BrickLog log(path_, "a", 8, 2);
+        ASSERT_TRUE(log.contains(key(1)));
+        try {
+            const Block expected = block(key(1), 1);
+            const auto read = log.read(key(1), expected.lattice, expected.box);
+            EXPECT_EQ(read->values.size(), expected.values.size());
+            EXPECT_LE(*std::max_element(read->coverage.begin(), read->coverage.end()), 1);
+        } catch (const InputError&) {
+            ++refused;
+        }
+    }
+    EXPECT_GT(refused, 20);
+}
+
 TEST_F(CacheTest, ALogOfSomethingElseIsRefusedAndLeftAlone) {
-    { BrickLog(path_, "a").append(key(1), block(key(1), 1)); }
+    { BrickLog(path_, "a", 8, 2).append(key(1), block(key(1), 1)); }
     const auto size = fs::file_size(path_);
-    EXPECT_THROW(BrickLog(path_, "b"), InputError);
-    EXPECT_THROW(BrickLog(path_, "aa"), InputError);
+    EXPECT_THROW(BrickLog(path_, "b", 8, 2), InputError);
+    EXPECT_THROW(BrickLog(path_, "aa", 8, 2), InputError);
     EXPECT_EQ(fs::file_size(path_), size);
     std::ofstream(path_) << "some text of somebody's, longer than a line";
-    EXPECT_THROW(BrickLog(path_, "a"), InputError);
-    EXPECT_THROW(BrickLog("/no/such/folder/log", "a"), IoError);
-    EXPECT_THROW(BrickLog("/tmp", "a"), IoError);
+    EXPECT_THROW(BrickLog(path_, "a", 8, 2), InputError);
+    EXPECT_THROW(BrickLog("/no/such/folder/log", "a", 8, 2), IoError);
+    EXPECT_THROW(BrickLog("/tmp", "a", 8, 2), IoError);
 }
 
 class Unseen : public BrickTarget {
@@ -128,7 +162,7 @@ TEST_F(CacheTest, ASchedulerReadsWhatItWouldSample) {
     Unseen first, second;
     std::int64_t sampled = 0;
     for (Unseen* target : {&first, &second}) {
-        options.archive = std::make_shared<BrickLog>(path_, "a");
+        options.archive = std::make_shared<BrickLog>(path_, "a", 8, 1);
         BrickScheduler scheduler(mesh, fields, resampler, options, *target);
         scheduler.finish({.threads = 2});
         if (target == &first) {
