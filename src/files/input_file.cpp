@@ -129,8 +129,10 @@ std::size_t InputFile::rfind(std::string_view word) {
     return npos;
 }
 
-std::string readWholeFile(const std::string& path) {
+std::string readWholeFile(const std::string& path, std::size_t mostBytes) {
     InputFile file(path);
+    if (file.size() > mostBytes)
+        throw InputError(path + ": larger than " + std::to_string(mostBytes >> 20) + " MiB");
     return file.copy(0, file.size());
 }
 

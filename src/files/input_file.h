@@ -46,7 +46,7 @@ class InputFile {
     std::size_t pieceAt_ = 0;
 };
 
-/// All of a file. Throws InputError as InputFile does.
-std::string readWholeFile(const std::string& path);
+/// All of a file. Throws InputError as InputFile does, and for a file that is larger.
+std::string readWholeFile(const std::string& path, std::size_t mostBytes = std::size_t(-1));
 
 }  // namespace tessera

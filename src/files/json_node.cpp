@@ -20,6 +20,8 @@ std::string countText(std::size_t count) {
 }
 
 /// The library would take the last of several keys of one name.
+constexpr std::size_t kMostBytes = 16 << 20;  // of a file: parsing takes several times that
+
 nlohmann::json parseOnce(const std::string& text) {
     constexpr int kDeepest = 32;
     std::vector<std::set<std::string>> keys;  // of the objects that are open
@@ -42,7 +44,7 @@ JsonNode::JsonNode(std::shared_ptr<const std::string> path, std::shared_ptr<cons
     : path_(std::move(path)), root_(std::move(root)), json_(&json), place_(std::move(place)) {}
 
 JsonNode JsonNode::read(const std::string& path, const std::string& what) {
-    const std::string text = readWholeFile(path);
+    const std::string text = readWholeFile(path, kMostBytes);
     std::shared_ptr<const nlohmann::json> root;
     try {
         root = std::make_shared<const nlohmann::json>(parseOnce(text));

@@ -20,6 +20,8 @@ bool isBetweenNumbers(char c) {
     return c == ' ' || c == '\t' || c == '\r';
 }
 
+constexpr std::size_t kMostBytes = 64 << 20;
+
 /// Three finite numbers with spaces between, or at most one comma; false for anything else.
 bool parsePlace(std::string_view line, Vec3d& place) {
     std::size_t at = 0;
@@ -45,7 +47,7 @@ bool parsePlace(std::string_view line, Vec3d& place) {
 }  // namespace
 
 std::vector<Vec3d> readFocusPath(const std::string& path) {
-    const std::string text = readWholeFile(path);
+    const std::string text = readWholeFile(path, kMostBytes);
     std::vector<Vec3d> places;
     std::size_t number = 0;
     for (std::size_t begin = 0; begin < text.size();) {

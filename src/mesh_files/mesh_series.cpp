@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kBlanks = " \t\r\n";
 constexpr double kTimeTolerance = 1e-9;
+constexpr std::size_t kMostEntries = 100000;
 
 bool isDigit(char c) {
     return c >= '0' && c <= '9';
@@ -176,7 +177,10 @@ std::vector<SeriesStep> Collection::steps() {
     std::vector<CollectionEntry> entries;
     XmlTags tags(file_, checkFrame(), file_.size());
     while (const auto tag = tags.next())
-        if (tag->name() == "DataSet") entries.push_back(readEntry(*tag));
+        if (tag->name() == "DataSet") {
+            if (entries.size() == kMostEntries) fail(tag->begin, "more than 100,000 files are named");
+            entries.push_back(readEntry(*tag));
+        }
     if (entries.empty()) throw InputError(path_ + ": names no files");
     checkTimes(entries);
     checkParts(entries);

@@ -13,7 +13,8 @@ class BrickArchive {
     virtual ~BrickArchive() = default;
 
     virtual bool contains(const DepthKey& key) const = 0;
-    /// A brick that is there, with the bits that were appended. Throws InputError where they are damaged, and IoError.
+    /// A brick that is there, with the bits that were appended. Throws InputError where they are damaged, and
+    /// IoError.
     /// @param lattice, @param box of its samples.
     virtual std::shared_ptr<const Block> read(const DepthKey& key, const Lattice& lattice,
                                               const IndexBox& box) const = 0;

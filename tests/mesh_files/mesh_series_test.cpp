@@ -166,6 +166,9 @@ TEST_F(MeshSeries, CollectionsThatGoWrongSayWhere) {
     expectError(entry("timestep='0' file='.'"), "isn't a regular file");
     expectError(entry("timestep='0' file='/dev/zero'"), "isn't a regular file");
     expectError("", "names no files");
+    std::string many;
+    for (int i = 0; i <= 100000; ++i) many += entry("file='run_1.vtu'");
+    expectError(many, "more than 100,000 files are named");
 }
 
 TEST_F(MeshSeries, WhatIsNoCollectionIsAnError) {

@@ -99,6 +99,10 @@ TEST_F(SceneFile, SaysAllThatASceneHas) {
     EXPECT_TRUE(linesOf(scene.effects, view).marks.words.back().text.ends_with(" mm"));
 }
 
+TEST_F(SceneFile, LargerThanAnySceneIsNotRead) {
+    EXPECT_EQ(refusal(std::string((16 << 20) + 1, ' ')), path() + ": larger than 16 MiB");
+}
+
 TEST_F(SceneFile, IsRefusedWithThePlaceOfWhatIsWrong) {
     const std::pair<const char*, const char*> cases[] = {
         {"{", "not JSON"},
