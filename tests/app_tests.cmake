@@ -23,8 +23,8 @@ if(TARGET tessera)
     COMMAND tessera_with_oracle compare ${PROJECT_SOURCE_DIR}/data/ccx-cavity/cavity.vtu --algorithms software,oracle --resolution 16)
   # Short runs; docs/testing.md tells of the long ones.
   add_test(NAME mutated_meshes
-    COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera> --count 60 --vdb-count 40 --seed 1
-            --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutants)
+    COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera>
+            --writer $<TARGET_FILE:write_box_files> --count 12 --seed 1 --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutants)
   add_test(NAME kill_test
     COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
             --count 20 --seed 1)

@@ -12,7 +12,12 @@ if(TESSERA_BUILD_IO)
   tessera_test(repair_data_test FOLDER mesh_files LINK reader)
   tessera_program(misbehaving_reader SOURCES reader/misbehaving_reader.cpp LINK reader)
   tessera_test(isolated_reader_test FOLDER reader LINK reader)
-  tessera_test(solver_formats_test FOLDER mesh_files LINK reader PRIVATE_LINK VTK::exodusII VTK::hdf5 VTK::cgns fmt::fmt)
+  # Small meshes in the formats of simulation programs, for tests here and for those in Python.
+  add_library(box_files STATIC mesh_files/box_files.cpp)
+  target_include_directories(box_files PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+  target_link_libraries(box_files PUBLIC tessera_reader VTK::exodusII VTK::cgns PRIVATE fmt::fmt tessera_flags)
+  tessera_program(write_box_files SOURCES mesh_files/write_box_files.cpp LINK reader PRIVATE_LINK box_files)
+  tessera_test(solver_formats_test FOLDER mesh_files LINK reader PRIVATE_LINK box_files VTK::exodusII VTK::hdf5 VTK::cgns)
   foreach(name isolated_reader_test solver_formats_test)
     target_compile_definitions(${name} PRIVATE TESSERA_MISBEHAVING_READER="$<TARGET_FILE:misbehaving_reader>"
       TESSERA_QUICK_READER="$<TARGET_FILE:tessera_read_mesh>")

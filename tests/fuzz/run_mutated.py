@@ -1,16 +1,18 @@
 #!/usr/bin/env python3
 """Runs tessera on damaged meshes, .vdb files and logs of bricks: it must end with exit code 0 or 2, soon, in little memory, with one line of error and no file left behind.
 
-usage: run_mutated.py --tessera PROGRAM [--count N] [--vdb-count N] [--seed S] [--first I] [--jobs J] [--keep FOLDER]
+usage: run_mutated.py --tessera PROGRAM [--format NAME,...] [--count N] [--seed S] [--first I] [--jobs J] [--keep FOLDER]
 
+Formats are vtk (XML and legacy files), parallel, multiblock, series, tetgen, exodus, cgns, ensight, openfoam and vdb (with logs); without --format all.
 The undamaged files are read first and must be accepted. A mutant that breaks a rule is kept, with the command and what went wrong, in a folder named by
-its seed and index.
+its format, seed and index.
 """
 
 import argparse
 import collections
 import concurrent.futures
 import dataclasses
+import functools
 import os
 import pathlib
 import random
@@ -22,9 +24,11 @@ import sys
 import tempfile
 import time
 
+import mutate_files
 import mutate_mesh
 import mutate_vdb
 
+FORMATS = ["vtk", *mutate_files.PLAIN_FORMATS, *mutate_files.WRITTEN_FORMATS, "vdb"]
 LONGEST_S = 10
 LARGEST_BYTES = 2 << 30
 LARGEST_VDB_BYTES = 1 << 30
@@ -54,6 +58,8 @@ VDB_COMMANDS = {
     "picture": (["picture", "bad.vdb", "-o", "out.png", "--quiet"], "out.png"),
     "like": (["resample", "mesh.vtu", "-o", "out.vdb", "--like", "bad.vdb", "--quiet", "--max-voxels", "1M"], "out.vdb"),
 }
+SET_COMMANDS = ["info"] * 6 + ["tets", "uniform", "uniform", "element-size"]
+SERIES_COMMANDS = ["info", "info", "tets"]  # resampling has an output for every step
 LOG_COMMAND = ["resample", "mesh.vtu", "-o", "out.vdb", "--refine", "error", "--max-error", "5%", "--quiet", "--resume", "bad.log"]
 
 
@@ -137,23 +143,27 @@ def faults_of(code, seconds, peak, stderr, new_files, output):
     return faults
 
 
+def write_files(folder, files):
+    for name, data in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
 def run_case(program, name, files, mesh, command_name, keep, origin):
     """Runs one command on one mesh in a folder of its own."""
     words, output = COMMANDS[command_name]
     arguments = [word.format(mesh=mesh) for word in words]
     folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-mutant-"))
     try:
-        for file_name, data in files.items():
-            (folder / file_name).write_bytes(data)
+        write_files(folder, files)
         code, seconds, peak, _, stderr = measured([program, *arguments], folder)
-        new_files = {str(p.relative_to(folder)) for p in folder.rglob("*")} - set(files)
+        new_files = {str(p.relative_to(folder)) for p in folder.rglob("*") if not p.is_dir()} - set(files)
         faults = faults_of(code, seconds, peak, stderr, new_files, output)
         if faults:
             place = keep / name
             shutil.rmtree(place, ignore_errors=True)
             place.mkdir(parents=True)
-            for file_name, data in files.items():
-                (place / file_name).write_bytes(data)
+            write_files(place, files)
             (place / "report.txt").write_text(
                 f"tessera {' '.join(arguments)}\nfrom {origin}\n{'; '.join(faults)}\nexit code {code}, {seconds:.2f} s, {peak >> 20} MiB\n{stderr}"
             )
@@ -166,6 +176,12 @@ def run_mutant(program, seed, index, keep):
     files, mesh, origin = mutate_mesh.make_mutant(seed, index)
     command = random.Random(f"{seed}:{index}:command").choice(list(COMMANDS))
     return run_case(program, f"mutant_{seed}_{index}", files, mesh, command, keep, origin)
+
+
+def run_set_mutant(program, seed, index, keep, kind, sets):
+    files, read_by, origin = mutate_files.make_mutant(sets, kind, seed, index)
+    command = random.Random(f"{seed}:{index}:command").choice(SERIES_COMMANDS if kind == "series" else SET_COMMANDS)
+    return run_case(program, f"{kind}_{seed}_{index}", files, read_by, command, keep, origin)
 
 
 def make_vdb_files(program):
@@ -213,13 +229,24 @@ def run_vdb_mutant(program, seed, index, keep, sound):
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def run_sound(program, name, keep):
+def run_sound(program, keep, name, files, read_by):
     """An undamaged file must be read: otherwise its mutants would test nothing."""
-    file = mutate_mesh.sound_files()[name]()
-    run = run_case(program, f"sound_{name}", {"mesh" + file.extension: file.serialise()}, "mesh" + file.extension, "tets", keep, name)
+    run = run_case(program, f"sound_{name}", files, read_by, "tets", keep, name)
     if run.code != 0 and not run.faults:
         run.faults.append(f"an undamaged file was refused: {run.stderr.strip()}")
     return run
+
+
+def undamaged(formats, sets):
+    """(name, files, the one that is read) of each."""
+    found = []
+    if "vtk" in formats:
+        for name, make in mutate_mesh.sound_files().items():
+            file = make()
+            found.append((name, {"mesh" + file.extension: file.serialise()}, "mesh" + file.extension))
+    for kind, cases in sets.items():
+        found += [(f"{kind} {case}", files, mutate_files.named_file(files)) for case, files in cases.items()]
+    return found
 
 
 def summarise(runs, title):
@@ -232,8 +259,9 @@ def summarise(runs, title):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tessera", required=True)
-    parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--vdb-count", type=int, default=0, help="of .vdb files and logs, after those of meshes")
+    parser.add_argument("--format", default=",".join(FORMATS), help="which formats, with commas between them (default: all)")
+    parser.add_argument("--count", type=int, default=1000, help="mutants of each format")
+    parser.add_argument("--writer", help="the test program write_box_files (default: the one of the program's build folder)")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--first", type=int, default=0, help="index of the first mutant")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
@@ -241,27 +269,34 @@ def main():
     parser.add_argument("--skip-sound", action="store_true", help="leave out the undamaged files")
     arguments = parser.parse_args()
     program = str(pathlib.Path(arguments.tessera).resolve())
+    writer = arguments.writer or str(pathlib.Path(program).parents[2] / "tests" / "write_box_files")
+    formats = arguments.format.split(",")
+    if unknown := [name for name in formats if name not in FORMATS]:
+        parser.error(f"there is no format {unknown[0]}; known are {', '.join(FORMATS)}")
     keep = arguments.keep.resolve()
+    sets = mutate_files.sound_sets([name for name in formats if name not in ("vtk", "vdb")], writer)
     print(f"seed {arguments.seed}, mutants {arguments.first} to {arguments.first + arguments.count - 1}", flush=True)
-    runs = []
+    runs, mutants = [], []
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         if not arguments.skip_sound:
-            runs = list(pool.map(lambda name: run_sound(program, name, keep), mutate_mesh.sound_files()))
-            summarise(runs, "undamaged")
-        indices = range(arguments.first, arguments.first + arguments.count)
-        mutants = []
-        for run in pool.map(lambda i: run_mutant(program, arguments.seed, i, keep), indices):
-            mutants.append(run)
-            if len(mutants) % 1000 == 0:
-                print(f"  {len(mutants)} mutants, {sum(bool(r.faults) for r in mutants)} offend", flush=True)
-        if mutants:
-            summarise(mutants, "mutants")
-        if arguments.vdb_count:
-            sound = make_vdb_files(program)
-            indices = range(arguments.first, arguments.first + arguments.vdb_count)
-            damaged = list(pool.map(lambda i: run_vdb_mutant(program, arguments.seed, i, keep, sound), indices))
-            summarise(damaged, ".vdb files and logs")
-            mutants += damaged
+            runs = list(pool.map(lambda sound: run_sound(program, keep, *sound), undamaged(formats, sets)))
+            if runs:
+                summarise(runs, "undamaged")
+        for name in formats:
+            if name == "vtk":
+                mutate = run_mutant
+            elif name == "vdb":
+                mutate = functools.partial(run_vdb_mutant, sound=make_vdb_files(program))
+            else:
+                mutate = functools.partial(run_set_mutant, kind=name, sets=sets[name])
+            done = []
+            indices = range(arguments.first, arguments.first + arguments.count)
+            for run in pool.map(lambda i, mutate=mutate: mutate(program, arguments.seed, i, keep), indices):
+                done.append(run)
+                if len(done) % 1000 == 0:
+                    print(f"  {len(done)} mutants, {sum(bool(r.faults) for r in done)} offend", flush=True)
+            summarise(done, name)
+            mutants += done
     offending = [run for run in runs + mutants if run.faults]
     for run in offending:
         print(f"FAILED {run.name}: {'; '.join(run.faults)}")
