@@ -1891,6 +1891,12 @@ class Compare(AppTest):
 class Reader(AppTest):
     """Meshes are read by a process of its own."""
 
+    def test_the_reader_of_common_formats_starts_without_the_libraries_of_others(self):
+        loaded = subprocess.run(["ldd", pathlib.Path(TESSERA).parent / "tessera_read_mesh"], capture_output=True, text=True, check=True).stdout
+        self.assertIn("libvtkIOXML", loaded)
+        for library in ("hdf5", "netcdf", "openvdb"):
+            self.assertNotIn(library, loaded)
+
     def read_by_a_stopped_child(self, *options):
         """A run of `info` and its child, stopped while it reads (or loads its libraries)."""
         for _ in range(10):
