@@ -20,6 +20,13 @@
 #include "tessera/error.h"
 #include "vdb/openvdb_grids.h"
 
+#ifdef __clang__
+// Declared extern by OpenVDB's headers, but Debian's library has no instance of them; GCC makes its own.
+template openvdb::Name openvdb::BoolGrid::gridType();
+template openvdb::Name openvdb::FloatGrid::gridType();
+template openvdb::Name openvdb::Vec3SGrid::gridType();
+#endif
+
 namespace tessera {
 namespace {
 
