@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "gl/gl_platform.h"
 #include "job/wrap_text.h"
 #include "tessera/error.h"
 #include "window.h"
@@ -20,6 +21,13 @@ constexpr int kExitBadInput = 2;
 
 void printError(const char* message) {
     std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
+}
+
+/// The tessera program that this one is installed with; empty where there is none.
+std::string programBeside() {
+    std::error_code error;
+    const auto candidate = std::filesystem::canonical("/proc/self/exe", error).parent_path() / "tessera";
+    return !error && std::filesystem::is_regular_file(candidate, error) ? candidate.string() : std::string();
 }
 
 int view(int argc, char** argv) {
@@ -51,7 +59,9 @@ int view(int argc, char** argv) {
         ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
     app.add_option("--threads", threads, "worker threads (default: one for every processor)")
         ->check(CLI::Range(0, 1024));
-    app.add_option("--reader", program, "the tessera program, which reads meshes in a process of its own")
+    app.add_option("--reader", program,
+                   "the tessera program, which reads meshes in a process of its own "
+                   "(default: the one beside this program)")
         ->group("");
     try {
         app.parse(argc, argv);
@@ -63,7 +73,12 @@ int view(int argc, char** argv) {
     }
     Job job;
     job.execution.threads = threads;
-    if (!program.empty()) job.reader = {program, {"read-mesh"}, quickReaderBeside(program)};
+    if (program.empty()) program = programBeside();
+    if (!program.empty()) {
+        const std::string quick = quickReaderBeside(program);
+        job.reader = {program, {"read-mesh"}, quick};
+        tryGlFirst({quick.empty() ? program : quick, {kTryGlCommand}});
+    }
     if (!gl.empty()) options.platform = parseGlPlatform(gl);
     SceneDocument document = scene.empty() ? SceneDocument() : SceneDocument::read(scene);
     if (!field.empty() || component) {

@@ -114,6 +114,11 @@ void addCommonOptions(CLI::App& command, CommonOptions& options, bool readsMesh 
                      "print nothing but errors, and a warning where a result isn't what was asked for");
     command.add_option("--json", options.jsonPath,
                        "write a report as JSON to this file, or to standard output for -");
+    command
+        .add_option("--max-driver-time", options.maxDriverSeconds,
+                    "seconds in which OpenGL's drivers must show that they work")
+        ->check(CLI::Range(0.01, 3600.0))
+        ->group("");  // for machines where that takes long, and for tests
     if (readsMesh) addReaderOptions(command, options.reader);
 }
 

@@ -12,6 +12,7 @@
 
 #include "command_line.h"
 #include "files/atomic_file.h"
+#include "gl/gl_trial.h"
 #include "interrupt.h"
 #include "job/wrap_text.h"
 #include "progress.h"
@@ -52,12 +53,10 @@ int run(const tessera::CommandLine& line) {
     return 0;
 }
 
-/// What the process that reads a file runs; another tessera process is its only user.
-int readForParent(const std::vector<std::string>& words) {
+/// What a process that another tessera starts runs.
+int serveParent(const std::vector<std::string>& words, int (*serve)(const std::vector<std::string>&)) {
     try {
-        std::vector<tessera::ReaderTask> tasks = tessera::vdbTasks();
-        tasks.push_back(tessera::meshTask());
-        return tessera::serveReader(words, tasks);
+        return serve(words);
     } catch (const tessera::InputError& error) {
         printError(error.what());
         return kExitBadInput;
@@ -65,6 +64,16 @@ int readForParent(const std::vector<std::string>& words) {
         printError(error.what());
     }
     return kExitFailure;
+}
+
+int readForParent(const std::vector<std::string>& words) {
+    std::vector<tessera::ReaderTask> tasks = tessera::vdbTasks();
+    tasks.push_back(tessera::meshTask());
+    return tessera::serveReader(words, tasks);
+}
+
+int tryGlForParent(const std::vector<std::string>& words) {
+    return tessera::serveGlTrial(words);
 }
 
 /// Libraries allocate in destructors, where a failure ends the program: in order, without unfinished files.
@@ -86,8 +95,9 @@ int readForParent(const std::vector<std::string>& words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc > 1 && std::string(argv[1]) == tessera::kReadMeshCommand)
-        _exit(readForParent({argv + 2, argv + argc}));
+    const std::string command = argc > 1 ? argv[1] : "";
+    if (command == tessera::kReadMeshCommand) _exit(serveParent({argv + 2, argv + argc}, readForParent));
+    if (command == tessera::kTryGlCommand) return serveParent({argv + 2, argv + argc}, tryGlForParent);
     holdClosedStreams();
     tessera::noteStart();
     tessera::installInterruptHandlers();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "gl/gl_trial.h"
 #include "job/field_selection.h"
 #include "job/program_presets.h"
 #include "job/resample_request.h"
@@ -29,6 +30,7 @@ struct CommonOptions {
     bool strict = false;   ///< a result that isn't what was asked for is an exit code of its own
     std::string jsonPath;  ///< empty: no report; "-": standard output
     ReaderArguments reader;
+    double maxDriverSeconds = GlTrial().seconds;  ///< that drivers of OpenGL may take to answer
 };
 
 /// The resampler and what it runs with, as typed.

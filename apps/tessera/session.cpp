@@ -12,6 +12,7 @@
 #include <string>
 
 #include "files/atomic_file.h"
+#include "gl/gl_platform.h"
 #include "interrupt.h"
 #include "job/wrap_text.h"
 #include "terminal.h"
@@ -68,10 +69,13 @@ Session::Session(const CommonOptions& options, const std::string& output)
         fellShort_ = true;
         printWarning(text);
     };
+    const std::string quick = quickReaderBeside(program);
+    tryGlFirst(
+        {quick.empty() ? program : quick, {kTryGlCommand}, options.maxDriverSeconds, &interruptFlag()});
     const ReaderArguments& reader = options.reader;
     checkReaderOptions(reader);
     job.followsLinks = reader.followsLinks;
-    if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quickReaderBeside(program)};
+    if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quick};
     if (!reader.maxMemory.empty())
         job.readerLimits.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
     if (!reader.maxSeconds) return;

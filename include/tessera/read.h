@@ -61,7 +61,8 @@ InputMesh read(const InputStep& step, const InputOptions& options = {}, const Ex
 /// InputError when nothing matches, a mesh is named twice or the .pvd file is damaged.
 std::vector<InputStep> listSteps(const std::vector<std::string>& inputs);
 
-/// Where InputOptions::program is when it is empty. Tessera's CMake package calls it, by the lines below.
+/// Where InputOptions::program is when it is empty, which also tries drivers of OpenGL before this process
+/// uses them. Tessera's CMake package calls it, by the lines below.
 void useProgram(const char* path);
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +20,7 @@ std::span<const Resampler* const> resamplers();
 void registerResampler(std::unique_ptr<const Resampler> resampler);
 
 /// Throws InputError, listing the names there are, when there is none of that name, or, with its reason, when
-/// it can't run here.
+/// it can't run here; GlError when that is for want of OpenGL.
 const Resampler& findResampler(std::string_view name);
 
 /// The same, also when it can't run here: for its name and bounds. Throws InputError, listing the names there
@@ -35,10 +36,17 @@ struct ResamplerChoice {
 /// The resampler of that name, or, for "auto", the one with the least Resampler::relativeCost() among those
 /// that can run here with these options and are exact to 2^-8 voxel. What auto chooses depends on the
 /// machine, and so do the bits of the result: it is never the default. Throws InputError when there is none,
-/// with each one's reason, or when the named one can't run here or doesn't have the options.
+/// with each one's reason, or when the named one can't run here or doesn't have the options; GlError when
+/// that is for want of OpenGL.
 ResamplerChoice chooseResampler(std::string_view name, const BindOptions& options = {});
 /// The same among given ones.
 ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, std::string_view name,
                                 const BindOptions& options);
+
+/// Where "auto" chose a resampler that failed on its device: the one that it goes on with, from the start,
+/// among those that need no device. None where a name was given, or no other one has the options.
+/// @param failure what the device said.
+std::optional<ResamplerChoice> chooseInstead(const ResamplerChoice& failed, const std::string& failure,
+                                             const BindOptions& options);
 
 }  // namespace tessera

@@ -136,16 +136,20 @@ class EglContext : public PlatformContext {
         if (!egl_.bindApi(EGL_OPENGL_API)) throw GlError("EGL offers no OpenGL: " + egl_.lastError());
         EGLConfig config = nullptr;  // EGL_NO_CONFIG_KHR
         if (!hasWord(extensions, "EGL_KHR_no_config_context")) config = chooseConfig();
-        const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                     4,
-                                     EGL_CONTEXT_MINOR_VERSION,
-                                     5,
-                                     EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                     EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                     EGL_CONTEXT_OPENGL_DEBUG,
-                                     debug ? EGL_TRUE : EGL_FALSE,
-                                     EGL_NONE};
-        context_ = egl_.createContext(display.handle, config, EGL_NO_CONTEXT, attributes);
+        std::vector<EGLint> attributes{EGL_CONTEXT_MAJOR_VERSION,       4,
+                                       EGL_CONTEXT_MINOR_VERSION,       5,
+                                       EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                       EGL_CONTEXT_OPENGL_DEBUG,        debug ? EGL_TRUE : EGL_FALSE};
+        // Without it a loss can't be told.
+        if (hasWord(extensions, "EGL_EXT_create_context_robustness")) {
+            std::vector<EGLint> robust = attributes;
+            robust.insert(robust.end(), {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
+                                         EGL_LOSE_CONTEXT_ON_RESET, EGL_NONE});
+            context_ = egl_.createContext(display.handle, config, EGL_NO_CONTEXT, robust.data());
+        }
+        attributes.push_back(EGL_NONE);
+        if (context_ == EGL_NO_CONTEXT)
+            context_ = egl_.createContext(display.handle, config, EGL_NO_CONTEXT, attributes.data());
         if (context_ == EGL_NO_CONTEXT)
             throw GlError("EGL gives no OpenGL 4.5 core context: " + egl_.lastError());
     }

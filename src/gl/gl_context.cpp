@@ -155,10 +155,20 @@ void GlContext::throwIfFailed() {
         lacksMemory = lacksMemory || error == GL_OUT_OF_MEMORY;
         text += (text.empty() ? "" : ", ") + errorName(error);
     }
+    if (isLost()) {
+        text = "the device was lost";
+        lacksMemory = false;
+    }
     for (const std::string& message : messages_) text += (text.empty() ? "" : ": ") + message;
     messages_.clear();
     if (lacksMemory) throw GlMemoryError("OpenGL failed: " + text);
     if (!text.empty()) throw GlError("OpenGL failed: " + text);
+}
+
+bool GlContext::isLost() noexcept {
+    // It is told once.
+    isLost_ = isLost_ || functions().GetGraphicsResetStatus() != GL_NO_ERROR;
+    return isLost_;
 }
 
 void GlContext::discardFailures() noexcept {

@@ -78,6 +78,8 @@ class GlContext {
     /// that are errors or undefined behaviour of high severity, and glGetError; GlMemoryError when there was
     /// no memory. Throws InternalError when a handle was destroyed on another thread.
     void throwIfFailed();
+    /// Whether the device lost the context, which can't be used any more. Only drivers that can tell say so.
+    bool isLost() noexcept;
     /// Forgets what went wrong since the last call.
     void discardFailures() noexcept;
 
@@ -95,6 +97,7 @@ class GlContext {
     std::unique_ptr<PlatformContext> platformContext_;
     std::shared_ptr<GlObjects> objects_;
     GlDeviceInfo info_;
+    bool isLost_ = false;
     std::vector<std::string> messages_;  // collected by the debug callback
 };
 

@@ -1,9 +1,11 @@
 #include "gl/gl_platform.h"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "gl/gl_context.h"
 #include "tessera/error.h"
@@ -17,6 +19,7 @@ constexpr std::array kPlatforms{GlPlatform::eglDevice, GlPlatform::eglSurfaceles
 /// What came of creating a context.
 struct Probe {
     std::string reason;
+    bool isFault = false;
     GlDeviceInfo info;
 };
 
@@ -33,15 +36,71 @@ Probe runProbe(GlPlatform platform) {
     return probe;
 }
 
+/// What is known of the platforms in this process.
+class Probes {
+  public:
+    void setTrial(GlTrial trial) {
+        const std::lock_guard lock(mutex_);
+        trial_ = std::move(trial);
+    }
+
+    /// Finds out what isn't known yet. Only the first call for a platform takes time.
+    void probe(std::span<const GlPlatform> platforms) {
+        const std::lock_guard lock(mutex_);
+        std::vector<GlPlatform> unknown;
+        for (const GlPlatform platform : platforms)
+            if (!slot(platform)) unknown.push_back(platform);
+        std::vector<GlTrialResult> results(unknown.size());
+        if (trial_ && !unknown.empty()) results = tryGl(*trial_, unknown);
+        for (std::size_t i = 0; i < unknown.size(); ++i) {
+            GlTrialResult& result = results[i];
+            slot(unknown[i]) = result.reason.empty() ? runProbe(unknown[i])
+                                                     : Probe{std::move(result.reason), result.isFault, {}};
+        }
+    }
+
+    /// What was found; it doesn't change any more. Null before.
+    const Probe* find(GlPlatform platform) {
+        const std::lock_guard lock(mutex_);
+        const std::optional<Probe>& known = slot(platform);
+        return known ? &*known : nullptr;
+    }
+
+  private:
+    std::optional<Probe>& slot(GlPlatform platform) { return slots_[static_cast<std::size_t>(platform)]; }
+
+    std::mutex mutex_;
+    std::optional<GlTrial> trial_;
+    std::array<std::optional<Probe>, kPlatforms.size()> slots_;
+};
+
+Probes& probes() {
+    static Probes& all = *new Probes;  // usable until the process ends
+    return all;
+}
+
 const Probe& probeOf(GlPlatform platform) {
-    struct Slot {
-        std::once_flag once;
-        Probe probe;
-    };
-    static auto& slots = *new std::array<Slot, kPlatforms.size()>;  // usable until the process ends
-    Slot& slot = slots[static_cast<std::size_t>(platform)];
-    std::call_once(slot.once, [&] { slot.probe = runProbe(platform); });
-    return slot.probe;
+    probes().probe(std::span(&platform, 1));
+    return *probes().find(platform);
+}
+
+/// "egl-device, osmesa: the driver crashed", each reason once, as far as platforms were probed.
+/// @param isTold which of them.
+std::string reasonsOf(bool (*isTold)(const Probe&)) {
+    std::vector<std::pair<std::string, std::string>> named;  // names, and their reason
+    for (const GlPlatform platform : kPlatforms) {
+        const Probe* probe = probes().find(platform);
+        if (!probe || !isTold(*probe)) continue;
+        const auto same = std::find_if(named.begin(), named.end(),
+                                       [&](const auto& entry) { return entry.second == probe->reason; });
+        if (same == named.end())
+            named.emplace_back(nameOf(platform), probe->reason);
+        else
+            same->first += ", " + std::string(nameOf(platform));
+    }
+    std::string text;
+    for (const auto& [names, reason] : named) text += (text.empty() ? "" : "; ") + names + ": " + reason;
+    return text;
 }
 
 }  // namespace
@@ -65,8 +124,23 @@ GlPlatform parseGlPlatform(std::string_view name) {
     throw InputError("no OpenGL platform is called '" + std::string(name) + "'; there are " + names);
 }
 
+void tryGlFirst(GlTrial trial) {
+    probes().setTrial(std::move(trial));
+}
+
 const std::string& unavailableReason(GlPlatform platform) {
     return probeOf(platform).reason;
+}
+
+std::string noGlReason() {
+    probes().probe(kPlatforms);
+    return "there is no OpenGL 4.5 here (" +
+           reasonsOf([](const Probe& probe) { return !probe.reason.empty(); }) + ")";
+}
+
+std::string glFaults() {
+    const std::string reasons = reasonsOf([](const Probe& probe) { return probe.isFault; });
+    return reasons.empty() ? reasons : "no OpenGL from " + reasons;
 }
 
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform) {
@@ -78,6 +152,7 @@ const GlDeviceInfo& glDeviceInfo(GlPlatform platform) {
 
 const std::vector<GlPlatform>& availableGlPlatforms() {
     static const auto& platforms = *new std::vector<GlPlatform>([] {
+        probes().probe(kPlatforms);
         const auto isThere = [](GlPlatform platform) { return unavailableReason(platform).empty(); };
         const bool hasDevice = isThere(GlPlatform::eglDevice);
         const bool isSoftwareDevice = hasDevice && glDeviceInfo(GlPlatform::eglDevice).isSoftware;
@@ -94,11 +169,7 @@ const std::vector<GlPlatform>& availableGlPlatforms() {
 GlPlatform chooseGlPlatform(std::optional<GlPlatform> wanted) {
     if (wanted) return glDeviceInfo(*wanted).platform;
     if (!availableGlPlatforms().empty()) return availableGlPlatforms().front();
-    std::string reasons;
-    for (const GlPlatform platform : kPlatforms)
-        reasons += (reasons.empty() ? "" : "; ") + std::string(nameOf(platform)) + ": " +
-                   unavailableReason(platform);
-    throw GlError("there is no OpenGL 4.5 here (" + reasons + ")");
+    throw GlError(noGlReason());
 }
 
 }  // namespace tessera

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "gl/gl_device.h"
+#include "gl/gl_trial.h"
 
 namespace tessera {
 
@@ -19,16 +20,26 @@ std::string_view nameOf(GlPlatform platform);
 /// @throws InputError, listing the names there are.
 GlPlatform parseGlPlatform(std::string_view name);
 
+/// From now on a platform is tried by this program before this process uses it for the first time.
+void tryGlFirst(GlTrial trial);
+
 /// Why no OpenGL 4.5 core context can be had from this platform, in one sentence; empty when it can. Found
-/// out by creating one, once a process. May be called from any thread, and leaves the caller's context alone.
+/// out by creating one, once a process, after the trial where one is set. May be called from any thread, and
+/// leaves the caller's context alone. @throws Cancelled as the trial does.
 const std::string& unavailableReason(GlPlatform platform);
+
+/// Why none of the platforms can be had: "there is no OpenGL 4.5 here (osmesa: ...)".
+std::string noGlReason();
+/// A sentence about the platforms whose drivers crashed or stalled when they were tried; empty without one.
+/// Tries none.
+std::string glFaults();
 
 /// The device that an available platform gives.
 /// @throws GlError with the reason when it is not available.
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform);
 
-/// The available platforms, best first: egl-device when it is real hardware, egl-surfaceless, osmesa, and
-/// egl-device when it is software.
+/// The available platforms, all of them tried at once, best first: egl-device when it is real hardware,
+/// egl-surfaceless, osmesa, and egl-device when it is software.
 const std::vector<GlPlatform>& availableGlPlatforms();
 
 /// The platform asked for or, when none is, the best one.

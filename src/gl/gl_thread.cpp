@@ -59,6 +59,8 @@ void GlThread::perform(const std::function<void(GlContext&)>& task) {
         context_->resetState();
         task(*context_);
     } catch (...) {
+        // Of a lost device all that was read back is garbage, and so is what a task makes of it.
+        if (context_->isLost()) context_->throwIfFailed();
         // The task's own exception says more than what OpenGL noticed on the way.
         context_->discardFailures();
         throw;

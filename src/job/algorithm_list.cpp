@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "job/algorithm_choice.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
 
@@ -23,10 +24,12 @@ Contestant contestantOf(const std::string& entry, const BindOptions& options) {
     if (colon == std::string::npos) return contestant;
     contestant.options.target = entry.substr(colon + 1);
     const std::vector<std::string> targets = contestant.resampler->targets();
-    if (std::find(targets.begin(), targets.end(), contestant.options.target) == targets.end())
+    if (std::find(targets.begin(), targets.end(), contestant.options.target) == targets.end()) {
+        if (contestant.resampler->info().isOnDevice) checkGlTarget(contestant.options.target);
         throw InputError(fmt::format("--algorithms: {} has no target '{}'; there are: {}",
                                      contestant.resampler->name(), contestant.options.target,
                                      fmt::join(targets, ", ")));
+    }
     return contestant;
 }
 

@@ -9,7 +9,7 @@
 
 #include "base/timer.h"
 #include "files/atomic_file.h"
-#include "job/algorithm_list.h"
+#include "job/algorithm_choice.h"
 #include "job/output_paths.h"
 #include "job/repair_report.h"
 #include "job/report_text.h"
@@ -17,7 +17,6 @@
 #include "pictures/image_exr.h"
 #include "resample/statistic_names.h"
 #include "tessera/error.h"
-#include "tessera/registry.h"
 
 namespace tessera {
 
@@ -44,9 +43,7 @@ class CutRun {
         : request_(request),
           job_(job),
           exr_(chooseFormat(request.output, request.format, {"exr", "png"}) == "exr"),
-          choice_(chooseResampler(request.algorithm, request.bind)) {
-        if (!choice_.reason.empty()) job.say(choice_.reason + "\n");
-    }
+          choice_(request.algorithm, request.bind, job) {}
     CutResult run();
 
   private:
@@ -62,7 +59,7 @@ class CutRun {
     const CutRequest& request_;
     Job& job_;
     const bool exr_;
-    ResamplerChoice choice_;
+    AlgorithmChoice choice_;
     FieldSelection selection_;
     CutSamples samples_;
     CutResult result_;
@@ -136,7 +133,7 @@ std::vector<ExrAttribute> CutRun::attributes() const {
     std::vector<ExrAttribute> all{
         {"tesseraVersion", std::string(TESSERA_VERSION)},
         {"tesseraSource", std::filesystem::path(request_.input).filename().string()},
-        {"tesseraAlgorithm", std::string(choice_.resampler->name())},
+        {"tesseraAlgorithm", std::string(choice_.resampler().name())},
         {"tesseraOrigin", lattice.originWorld},
         {"tesseraU", lattice.uWorld},
         {"tesseraV", lattice.vWorld},
@@ -144,7 +141,7 @@ std::vector<ExrAttribute> CutRun::attributes() const {
         {"tesseraSpacing", result_.cut.frame.spacingWorld()}};
     if (const std::string repair = encodeRepair(request_.repair); !repair.empty())
         all.push_back({"tesseraRepair", repair});
-    if (!choice_.resampler->info().targetsAgree) all.push_back({"tesseraTarget", samples_.target});
+    if (!choice_.resampler().info().targetsAgree) all.push_back({"tesseraTarget", samples_.target});
     if (const std::string format = lossyFormat(request_.bind); !format.empty())
         all.push_back({"tesseraSampleFormat", format});
     return all;
@@ -244,14 +241,14 @@ CutResult CutRun::run() {
     const PlaneQuery query(mesh, job_.execution);
     result_.times.indexMs = timer.restart();
     CutOptions options = request_.cut;
-    options.spillVoxels = choice_.resampler->info().spillBoundVoxels;
-    result_.cut = planCut(mesh, query, options);
-    result_.times.queryMs = timer.elapsedMs();
-    checkMemory();
-    timer.restart();
-    samples_ =
-        sampleCut(mesh, result_.cut, selection_.fields, *choice_.resampler, request_.bind, job_.execution);
-    result_.times.resampleMs = timer.restart();
+    choice_.run([&](const Resampler& resampler) {
+        options.spillVoxels = resampler.info().spillBoundVoxels;
+        result_.cut = planCut(mesh, query, options);
+        result_.times.queryMs = timer.restart();
+        checkMemory();
+        samples_ = sampleCut(mesh, result_.cut, selection_.fields, resampler, request_.bind, job_.execution);
+        result_.times.resampleMs = timer.restart();
+    });
     if (samples_.statistics.count(counted::coveredPoints) == 0)
         throw InputError(
             fmt::format("{}: no pixel's centre on the plane {} lies in the mesh: nothing to show",
@@ -260,8 +257,8 @@ CutResult CutRun::run() {
     exr_ ? writeExrFile() : writePngFile();
     result_.times.writeMs = timer.elapsedMs();
     job_.say(resultText());
-    result_.algorithm = choice_.resampler->name();
-    result_.algorithmReason = choice_.reason;
+    result_.algorithm = choice_.resampler().name();
+    result_.algorithmReason = choice_.reason();
     result_.target = samples_.target;
     result_.statistics = samples_.statistics;
     return std::move(result_);

@@ -9,6 +9,7 @@
 
 #include "base/timer.h"
 #include "files/atomic_file.h"
+#include "job/algorithm_choice.h"
 #include "job/focus_path.h"
 #include "job/focus_trace_html.h"
 #include "job/focus_trace_text.h"
@@ -17,7 +18,6 @@
 #include "job/report_text.h"
 #include "schedule/brick_scheduler.h"
 #include "tessera/error.h"
-#include "tessera/registry.h"
 
 namespace tessera {
 
@@ -58,23 +58,22 @@ class FocusTraceRun {
     FocusTraceRun(const FocusTraceRequest& request, Job& job)
         : request_(request),
           job_(job),
-          choice_(chooseResampler(request.algorithm, request.bind)),
+          choice_(request.algorithm, request.bind, job),
           execution_(job.execution.withoutProgress()) {
         if (!request.output.empty()) format_ = chooseFormat(request.output, request.format, {"csv", "html"});
-        if (!choice_.reason.empty()) job.say(choice_.reason + "\n");
     }
     FocusTrace run();
 
   private:
     void checkUsage() const;
-    void prepare();
+    void prepare(const Resampler& resampler);
     void follow();
     FocusStep step(const Vec3d& placeWorld);
     void write();
 
     const FocusTraceRequest& request_;
     Job& job_;
-    ResamplerChoice choice_;
+    AlgorithmChoice choice_;
     Execution execution_;
     std::string format_;  // empty: nothing is written
     std::vector<Vec3d> path_;
@@ -97,7 +96,7 @@ void FocusTraceRun::checkUsage() const {
 }
 
 /// All that bricks are made from, and the coarsest of them in order.
-void FocusTraceRun::prepare() {
+void FocusTraceRun::prepare(const Resampler& resampler) {
     const TetMesh& mesh = trace_.file.mesh;
     selection_ = selectFields(mesh, request_.fields);
     Timer timer;
@@ -112,8 +111,8 @@ void FocusTraceRun::prepare() {
     options.refine.bind.index->get(job_.execution);
     options.budgetBytes = request_.budgetBytes;
     trace_.times.indexMs = timer.restart();
-    scheduler_ = std::make_unique<BrickScheduler>(mesh, selection_.fields, *choice_.resampler, options,
-                                                  watch_, execution_);
+    scheduler_ =
+        std::make_unique<BrickScheduler>(mesh, selection_.fields, resampler, options, watch_, execution_);
     trace_.times.buildMs = timer.elapsedMs();
     trace_.finestSpacingWorld = scheduler_->frame().spacingWorld(scheduler_->frame().maxDepth);
     for (std::size_t i = 0; i < selection_.fields.size() && !errors_; ++i) {
@@ -155,6 +154,7 @@ FocusStep FocusTraceRun::step(const Vec3d& placeWorld) {
 
 void FocusTraceRun::follow() {
     Timer timer;
+    trace_.steps.clear();
     for (std::size_t i = 0; i < path_.size(); ++i) {
         job_.execution.report(Stage::sampling, std::int64_t(i), std::int64_t(path_.size()));
         trace_.steps.push_back(step(path_[i]));
@@ -185,10 +185,12 @@ FocusTrace FocusTraceRun::run() {
                              request_.repair, job_);
     trace_.times.readMs = timer.elapsedMs();
     tellRepair(request_.input, trace_.file, job_);
-    trace_.algorithm = choice_.resampler->name();
-    trace_.algorithmReason = choice_.reason;
-    prepare();
-    follow();
+    choice_.run([&](const Resampler& resampler) {
+        prepare(resampler);
+        follow();
+    });
+    trace_.algorithm = choice_.resampler().name();
+    trace_.algorithmReason = choice_.reason();
     trace_.target = scheduler_->resamplerTarget();
     trace_.statistics = scheduler_->statistics();
     write();

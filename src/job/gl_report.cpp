@@ -121,6 +121,8 @@ Json deviceJson(const GlDeviceInfo& info) {
 std::string glText(std::size_t width) {
     std::string text, order;
     std::vector<GlDeviceInfo> devices;
+    for (const GlPlatform platform : availableGlPlatforms())
+        order += (order.empty() ? "" : ", ") + std::string(nameOf(platform));
     for (const GlPlatform platform : glPlatforms()) {
         const std::string& reason = unavailableReason(platform);
         text += fmt::format("{}: {}\n", nameOf(platform), reason.empty() ? "available" : "no, " + reason);
@@ -128,14 +130,13 @@ std::string glText(std::size_t width) {
         devices.push_back(glDeviceInfo(platform));
         text += deviceText(devices.back());
     }
-    for (const GlPlatform platform : availableGlPlatforms())
-        order += (order.empty() ? "" : ", ") + std::string(nameOf(platform));
     text += fmt::format("order of preference: {}\n", order.empty() ? "none is available" : order);
     return devices.empty() ? text : text + limitsText(devices, width) + formatsText(devices, width);
 }
 
 Json glJson() {
     Json platforms = Json::array(), order = Json::array();
+    for (const GlPlatform platform : availableGlPlatforms()) order.push_back(nameOf(platform));
     for (const GlPlatform platform : glPlatforms()) {
         const std::string& reason = unavailableReason(platform);
         Json entry{{"name", nameOf(platform)}, {"available", reason.empty()}};
@@ -145,7 +146,6 @@ Json glJson() {
             entry["reason"] = reason;
         platforms.push_back(entry);
     }
-    for (const GlPlatform platform : availableGlPlatforms()) order.push_back(nameOf(platform));
     return {{"platforms", platforms}, {"preference", order}};
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "files/atomic_file.h"
+#include "job/algorithm_choice.h"
 #include "job/output_paths.h"
 #include "job/scene_picture.h"
 #include "job/series_steps.h"
@@ -76,6 +77,7 @@ RenderedFrames drawFrames(const FramesRequest& request, const Scene& asked,
     RenderedFrames frames;
     frames.outputs = outputs;
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.picture.platform));
+    warnOfDrivers(job);
     SliceRenderer renderer(thread);
     std::unique_ptr<PictureSource> source;
     Scene scene;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "files/atomic_file.h"
+#include "job/algorithm_choice.h"
 #include "job/describe_files.h"
 #include "job/import_mesh.h"
 #include "job/mesh_source.h"
@@ -141,6 +142,7 @@ namespace {
 RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job& job) {
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
+    warnOfDrivers(job);
     const std::unique_ptr<PictureSource> source = openPictureSource(request.input, scene, thread, job);
     const ScenePicture asked = pictureOf(withEffectsOf(scene, *source, job), *source, !isExr);
     if (asked.lacksLegend)

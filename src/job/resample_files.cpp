@@ -8,6 +8,7 @@
 
 #include "base/timer.h"
 #include "files/atomic_file.h"
+#include "job/algorithm_choice.h"
 #include "job/import_mesh.h"
 #include "job/output_paths.h"
 #include "job/repair_report.h"
@@ -18,7 +19,6 @@
 #include "refine/plan.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
-#include "tessera/registry.h"
 #include "vdb/vdb_metadata.h"
 
 namespace tessera {
@@ -60,12 +60,10 @@ void checkOutputs(const std::vector<ResampleStep>& steps, const ResampleRequest&
 class ResampleRun {
   public:
     ResampleRun(const ResampleRequest& request, Job& job)
-        : request_(request), job_(job), choice_(chooseResampler(request.algorithm, request.refine.bind)) {
-        request_.write.algorithm = choice_.resampler->name();
+        : request_(request), job_(job), choice_(request.algorithm, request.refine.bind, job) {
         request_.write.boundsWorld = request_.refine.boundsWorld;
         request_.write.layers = request_.shape.layers;
         request_.write.repair = encodeRepair(request_.repair);
-        if (!choice_.reason.empty()) job.say(choice_.reason + "\n");
     }
     Json run();
 
@@ -82,7 +80,7 @@ class ResampleRun {
 
     ResampleRequest request_;
     Job& job_;
-    ResamplerChoice choice_;
+    AlgorithmChoice choice_;
     StageTimes allTimes_;
     Json series_;
     bool isSeries_ = false;
@@ -183,7 +181,11 @@ void ResampleRun::surveySpacing(const TetMesh& mesh) {
     const FieldSelection& selection = plan.selection;
     const BrickTree tree =
         plan.refine.criterion.has(Criterion::error) || plan.refine.criterion.has(Criterion::visibility)
-            ? makeBricks(mesh, selection.fields, *choice_.resampler, plan.refine, job_.execution).tree
+            ? choice_
+                  .run([&](const Resampler& resampler) {
+                      return makeBricks(mesh, selection.fields, resampler, plan.refine, job_.execution);
+                  })
+                  .tree
             : planBricks(mesh, plan.refine, job_.execution, selection.channels);
     if (!seriesFrame_ || tree.spacingWorld() < seriesFrame_->spacingWorld)
         seriesFrame_ = FixedFrame{tree.originWorld(), tree.spacingWorld()};
@@ -197,9 +199,13 @@ Json ResampleRun::runStep(const ResampleStep& step) {
     const StepPlan plan = planStep(file.mesh, request_);
     checkOutputFields(plan.selection.outputs, request_.shape.hasSurface());
     sayImport(step, file, plan);
+    const auto resample = [&](const Resampler& resampler) {
+        request_.write.algorithm = resampler.name();
+        return resampleStep(step, file.mesh, plan, request_, resampler, times, job_.execution);
+    };
+    // A log holds bricks of one algorithm.
+    const StepResult result = request_.log.empty() ? choice_.run(resample) : resample(choice_.resampler());
     Json report = documentOf(step);
-    const StepResult result =
-        resampleStep(step, file.mesh, plan, request_, *choice_.resampler, times, job_.execution);
     // A dry run says what falls short first, others when the file is there.
     if (request_.dryRun) fellShort(step, shortfalls(result, request_));
     std::string text = stepText(result, request_, job_.textWidth);
@@ -223,8 +229,8 @@ Json ResampleRun::documentOf(const ResampleStep& step) const {
     Json report = documentHead("resample");
     report["input"] = step.source.files[0];
     report["output"] = request_.dryRun ? Json(nullptr) : Json(step.output);
-    report["algorithm"] = choice_.resampler->name();
-    report["algorithm_reason"] = choice_.reason;
+    report["algorithm"] = choice_.resampler().name();
+    report["algorithm_reason"] = choice_.reason();
     report["sample_format"] = nameOf(request_.refine.bind.format);
     report["criterion"] = request_.write.criterion;
     report["layout"] = request_.shape.layout == VdbLayout::flat ? "flat" : "levels";

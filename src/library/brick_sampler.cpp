@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "library/field_choice.h"
+#include "library/program.h"
 #include "mesh/element_index.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
@@ -29,6 +30,7 @@ BrickSampler::BrickSampler(const TetMesh& mesh, const SamplerOptions& options)
     BindOptions bind;
     bind.route = Route::index;
     bind.index = std::make_shared<const SharedElementIndex>(mesh);
+    tryDriversFor(options.algorithm);
     parts_->bound = chooseResampler(options.algorithm, bind).resampler->bind(mesh, chosen.fields, bind);
     const Box3d bounds = mesh.boundsWorld();
     if (bounds.empty()) throw InputError("the mesh has no elements");

@@ -2,9 +2,11 @@
 #include "mesh_files/find_field.h"
 
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "library/brick_parts.h"
+#include "library/program.h"
 #include "refine/error_samples.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
@@ -50,12 +52,23 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->options = options;
     parts->chosen = chooseFields(mesh, options.fields);
     parts->refine = refineOptions(mesh, parts->chosen, options);
-    const ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind);
+    tryDriversFor(options.algorithm);
+    ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind);
+    const auto make = [&] {
+        parts->result = makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
+    };
+    try {
+        make();
+    } catch (const GlError& error) {
+        const std::optional<ResamplerChoice> other = chooseInstead(choice, error.what(), parts->refine.bind);
+        if (!other) throw;
+        choice = *other;
+        make();
+    }
     parts->resampler = choice.resampler;
     parts->options.algorithm = choice.resampler->name();
     parts->options.fields.clear();
     for (const BrickField& field : parts->chosen.described) parts->options.fields.push_back(field.name);
-    parts->result = makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
     if (!choice.reason.empty()) parts->result.notes.insert(parts->result.notes.begin(), choice.reason);
     // Names in a mesh needn't be unique.
     for (std::size_t f = 0; f < parts->chosen.described.size(); ++f)

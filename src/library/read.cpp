@@ -1,13 +1,9 @@
 #include "tessera/read.h"
 
-#include <unistd.h>
-
-#include <cstdlib>
 #include <filesystem>
-#include <span>
-#include <string_view>
 
 #include "files/named_file.h"
+#include "library/program.h"
 #include "mesh_files/mesh_series.h"
 #include "reader/isolated_reader.h"
 #include "tessera/error.h"
@@ -16,32 +12,8 @@ namespace tessera {
 
 namespace {
 
-std::string& knownProgram() {
-    static std::string path;
-    return path;
-}
-
-bool isProgram(const std::string& path) {
-    std::error_code error;
-    return std::filesystem::is_regular_file(path, error) && ::access(path.c_str(), X_OK) == 0;
-}
-
-std::string programInPath() {
-    const char* folders = std::getenv("PATH");
-    std::string_view rest = folders ? folders : "";
-    while (!rest.empty()) {
-        const std::string_view folder = rest.substr(0, rest.find(':'));
-        rest.remove_prefix(std::min(rest.size(), folder.size() + 1));
-        const std::string path = std::string(folder.empty() ? "." : folder) + "/tessera";
-        if (isProgram(path)) return path;
-    }
-    return {};
-}
-
 IsolatedReader findReader(const std::string& given) {
-    std::string program = given;
-    if (program.empty() && isProgram(knownProgram())) program = knownProgram();
-    if (program.empty()) program = programInPath();
+    const std::string program = given.empty() ? findProgram() : given;
     if (program.empty())
         throw IoError(
             "the program tessera, which reads meshes in a separate process, was not found beside the library "
@@ -69,10 +41,6 @@ InputMesh readFiles(const std::vector<std::string>& files, const std::string& fo
 }
 
 }  // namespace
-
-void useProgram(const char* path) {
-    knownProgram() = path;
-}
 
 InputMesh read(const InputStep& step, const InputOptions& options, const Execution& execution) {
     InputMesh input = readFiles(step.files, step.collection.empty() ? "" : folderOf(step.collection),

@@ -450,12 +450,7 @@ RasterResampler::RasterResampler(std::string name, std::string description, Meth
       cost_(cost) {}
 
 std::string RasterResampler::unavailableReason() const {
-    if (!availableGlPlatforms().empty()) return {};
-    std::string reasons;
-    for (const GlPlatform platform : glPlatforms())
-        reasons += (reasons.empty() ? "" : "; ") + std::string(nameOf(platform)) + ": " +
-                   tessera::unavailableReason(platform);
-    return "there is no OpenGL 4.5 here (" + reasons + ")";
+    return availableGlPlatforms().empty() ? noGlReason() : std::string();
 }
 
 double RasterResampler::relativeCost() const {

@@ -1,32 +1,19 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "base/child_process.h"
 
 namespace tessera {
 
 /// Descriptors that a reader's process finds open.
 constexpr int kReportDescriptor = 3;  ///< a socket to its parent: the request comes, reports go
 constexpr int kAnswerDescriptor = 4;  ///< an empty file in memory (memfd) for the answer
-
-/// A file descriptor that closes itself.
-class Descriptor {
-  public:
-    explicit Descriptor(int number = -1) : number_(number) {}
-    ~Descriptor() { close(); }
-    Descriptor(Descriptor&& other) noexcept : number_(other.number_) { other.number_ = -1; }
-    Descriptor& operator=(Descriptor&& other) noexcept;
-    int get() const { return number_; }
-    void close();
-
-  private:
-    int number_;
-};
 
 /// A file in memory as read-only bytes that nobody can change any more.
 class SealedMemory {
@@ -43,38 +30,20 @@ class SealedMemory {
     std::span<const std::byte> bytes_;
 };
 
-/// How a child ended.
-struct ProcessEnd {
-    std::string words;  ///< "crashed (signal 11, Segmentation fault)", "ended without a result (exit code 7)"
-    bool bySignal = false;
-    bool byProcessorLimit = false;  ///< the system's (ulimit -t)
-};
-
-/// A running child with nothing but the two descriptors above; its standard streams lead nowhere, and it
-/// doesn't see the terminal's signals. It is killed and reaped when this object ends.
+/// A running child with nothing but the two descriptors above. It is killed and reaped when this object ends.
 class ReaderProcess {
   public:
     /// Throws IoError when the program can't be started.
     ReaderProcess(const std::string& executable, const std::vector<std::string>& arguments);
-    ~ReaderProcess();
-    ReaderProcess(const ReaderProcess&) = delete;
-    ReaderProcess& operator=(const ReaderProcess&) = delete;
 
     int reports() const { return reports_.get(); }  ///< never blocks
     int answer() const { return answer_.get(); }
-    /// Processor time that the child has taken so far, of all its threads; 0 when it has ended.
-    double processorSeconds() const;
-    /// Says how a child ended that closed its reports: "crashed (signal 11, Segmentation fault)", "ended
-    /// without a result (exit code 7)". Kills it if it hasn't ended after all.
-    ProcessEnd describeEnd();
+    double processorSeconds() const { return child_->processorSeconds(); }
+    ProcessEnd describeEnd() { return child_->describeEnd(); }
 
   private:
-    void kill();
-    void open();
-
-    Descriptor childReports_, childAnswer_;  // until the child has them
     Descriptor reports_, answer_;
-    pid_t child_ = -1;
+    std::optional<ChildProcess> child_;
 };
 
 }  // namespace tessera

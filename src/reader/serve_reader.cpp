@@ -4,7 +4,6 @@
 #include <link.h>
 #include <malloc.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -16,6 +15,7 @@
 #include <new>
 #include <system_error>
 
+#include "base/child_process.h"
 #include "base/sanitizers.h"
 #include "base/timer.h"
 #include "files/named_file.h"
@@ -143,14 +143,6 @@ void limitMemory([[maybe_unused]] std::int64_t memoryBytes, [[maybe_unused]] con
 #endif
 }
 
-/// Ends this process with its parent, leaves no core file, and writes without a signal.
-void settle(std::int64_t parent) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (std::int64_t(::getppid()) != parent) ::raise(SIGKILL);  // it ended before the line above
-    lowerLimit(RLIMIT_CORE, 0);
-    ::signal(SIGXFSZ, SIG_IGN);
-}
-
 /// A limit on file sizes holds for memory files too.
 bool memoryTakes(std::int64_t bytes) {
     rlimit limit{};
@@ -232,7 +224,8 @@ int serveReader(std::span<const std::string> arguments, std::span<const ReaderTa
     const std::int64_t parent = parseStart(arguments);
     if (::fcntl(kReportDescriptor, F_GETFD) < 0 || ::fcntl(kAnswerDescriptor, F_GET_SEALS) < 0)
         throw InputError("the reader of meshes is started by tessera itself");
-    settle(parent);
+    settleAsChild(parent);
+    ::signal(SIGXFSZ, SIG_IGN);
     std::set_terminate(reportAndEnd);
     try {
         serve(parent, tasks);

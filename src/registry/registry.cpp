@@ -32,9 +32,10 @@ const Resampler& named(std::span<const Resampler* const> candidates, std::string
 
 const Resampler& available(const Resampler& resampler) {
     const std::string reason = resampler.unavailableReason();
-    if (!reason.empty())
-        throw InputError("algorithm " + std::string(resampler.name()) + " can't run here: " + reason);
-    return resampler;
+    if (reason.empty()) return resampler;
+    const std::string line = "algorithm " + std::string(resampler.name()) + " can't run here: " + reason;
+    if (resampler.info().isOnDevice) throw GlError(line);  // the machine's fault
+    throw InputError(line);
 }
 
 bool has(const auto& list, const auto& item) {
@@ -130,6 +131,22 @@ ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, st
     choice.reason = "auto chose " + std::string(choice.resampler->name()) +
                     (list.empty() ? ", the only one there is" : ": " + list);
     return choice;
+}
+
+std::optional<ResamplerChoice> chooseInstead(const ResamplerChoice& failed, const std::string& failure,
+                                             const BindOptions& options) {
+    if (failed.reason.empty() || !failed.resampler->info().isOnDevice) return std::nullopt;
+    std::vector<const Resampler*> others;
+    for (const Resampler* other : resamplers())
+        if (!other->info().isOnDevice) others.push_back(other);
+    try {
+        ResamplerChoice choice = chooseResampler(others, "auto", options);
+        choice.reason = std::string(failed.resampler->name()) + " failed here (" + failure +
+                        "), so auto goes on with " + std::string(choice.resampler->name());
+        return choice;
+    } catch (const InputError&) {  // none has the options
+        return std::nullopt;
+    }
 }
 
 }  // namespace tessera

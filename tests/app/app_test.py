@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Drives the tessera program as a user does: bad input, failing outputs, interruption, series, reports.
 
-usage: app_test.py --tessera PROGRAM --data FOLDER [unittest arguments]
+usage: app_test.py --tessera PROGRAM --data FOLDER [--broken-drivers FOLDER] [unittest arguments]
 """
 
 import base64
@@ -32,6 +32,7 @@ from signal_handlers import catches
 TESSERA = ""
 FORKED = None
 DATA = pathlib.Path()
+BROKEN_DRIVERS = pathlib.Path()
 
 CUBE_POINTS = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 CUBE_TETS = [(0, 1, 3, 7), (0, 3, 2, 7), (0, 2, 6, 7), (0, 6, 4, 7), (0, 4, 5, 7), (0, 5, 1, 7)]
@@ -2142,10 +2143,78 @@ class Help(AppTest):
         self.assertRegex(self.succeed("--version"), r"^tessera \d+\.\d+\.\d+\n$")
 
 
+class Drivers(AppTest):
+    """OpenGL drivers that crash, stall or lose their device cost a result that needs them, and no more."""
+
+    CRASH = "the driver crashed (signal 11, Segmentation fault)"
+
+    def broken(self, way, platforms=("egl", "osmesa")):
+        return dict(os.environ, LD_LIBRARY_PATH=":".join(str(BROKEN_DRIVERS / p) for p in platforms), TESSERA_BROKEN_DRIVER=way)
+
+    def sample(self, *options, env=None):
+        return self.run_tessera("resample", self.cube, "-o", "out.vdb", "--refine", "uniform", "--resolution", "12", *options, env=env)
+
+    def check_auto(self, env, reason, *options):
+        """Software's result, and one warning."""
+        self.assertEqual(self.sample().returncode, 0)
+        expected = self.report("info", "out.vdb")
+        result = self.sample("--algorithm", "auto", *options, env=env)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr, f"tessera: warning: no OpenGL from egl-device, egl-surfaceless, osmesa: {reason}\n")
+        self.assertIn("auto chose software", result.stdout)
+        self.assertEqual(self.report("info", "out.vdb"), expected)
+        os.remove(self.folder / "out.vdb")
+
+    def test_a_driver_that_crashes_is_a_reason(self):
+        for way in ("load", "draw"):
+            env = self.broken(way)
+            self.check_auto(env, self.CRASH)
+            text = self.succeed("info", "--gl", env=env)
+            for platform in ("egl-device", "egl-surfaceless", "osmesa"):
+                self.assertIn(f"{platform}: no, {self.CRASH}\n", text)
+            compared = self.succeed("compare", self.cube, "--resolution", "12", env=env)
+            for algorithm in ("slicing", "hybrid"):
+                self.assertIn(f"{algorithm} is left out: there is no OpenGL 4.5 here", compared)
+            for arguments in (("slice", self.cube, "-o", "out.png"), ("resample", self.cube, "-o", "out.vdb")):
+                self.reject(1, self.CRASH, *arguments, "--algorithm", "slicing", env=env)
+        self.reject(1, f"no OpenGL from osmesa: {self.CRASH}", "render", self.cube, "-o", "out.png", "--gl", "osmesa", env=env)
+        self.reject(1, f"no OpenGL from osmesa: {self.CRASH}", "compare", self.cube, "--algorithms", "hybrid:osmesa",
+                    env=self.broken("load", ["osmesa"]))
+
+    def test_a_driver_that_stalls_is_a_reason(self):
+        env = self.broken("stall")
+        self.check_auto(env, "the driver didn't answer within 0.3 s", "--max-driver-time", "0.3")
+        self.reject(1, "the driver didn't answer within 0.3 s", "render", self.cube, "-o", "out.png", "--max-driver-time", "0.3", env=env)
+
+    def test_other_platforms_are_used_in_place_of_a_broken_one(self):
+        result = self.sample("--algorithm", "hybrid", "--json", "report.json", env=self.broken("load", ["egl"]))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr, f"tessera: warning: no OpenGL from egl-device, egl-surfaceless: {self.CRASH}\n")
+        self.assertEqual(json.loads((self.folder / "report.json").read_text())["target"], "osmesa")
+
+    def test_a_device_that_is_lost_is_an_error(self):
+        for algorithm in ("slicing", "hybrid"):
+            self.reject(1, "OpenGL failed: the device was lost", "resample", self.cube, "-o", "out.vdb", "--algorithm", algorithm,
+                        "--refine", "uniform", "--resolution", "60", env=self.broken("lose"))
+
+    def test_software_tries_no_driver(self):
+        result = self.sample("--algorithm", "software", env=self.broken("load"))
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+
+
 if __name__ == "__main__":
     arguments = sys.argv[1:]
-    TESSERA = str(pathlib.Path(arguments[arguments.index("--tessera") + 1]).resolve())
+
+    def take(name):
+        """An option and its value, which unittest doesn't see."""
+        at = arguments.index(name)
+        value = pathlib.Path(arguments[at + 1]).resolve()
+        del arguments[at : at + 2]
+        return value
+
+    TESSERA = str(take("--tessera"))
     FORKED = ForkedTessera(TESSERA)
-    DATA = pathlib.Path(arguments[arguments.index("--data") + 1]).resolve()
-    rest = [a for i, a in enumerate(arguments) if a not in ("--tessera", "--data") and (i == 0 or arguments[i - 1] not in ("--tessera", "--data"))]
-    unittest.main(argv=[sys.argv[0], *rest])
+    DATA = take("--data")
+    if "--broken-drivers" in arguments:
+        BROKEN_DRIVERS = take("--broken-drivers")
+    unittest.main(argv=[sys.argv[0], *arguments])

@@ -3,15 +3,19 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <sstream>
 
 #include "files/atomic_file.h"
+#include "job/cut_mesh.h"
 #include "job/describe_files.h"
 #include "job/focus_path.h"
 #include "job/focus_trace.h"
 #include "job/resample_files.h"
 #include "job/verify_file.h"
 #include "tessera/error.h"
+#include "tessera/registry.h"
 
 namespace tessera {
 namespace {
@@ -26,6 +30,7 @@ class JobTest : public testing::Test {
     JobTest() : folder_(fs::path(testing::TempDir()) / ("job_test_" + std::to_string(::getpid()))) {
         fs::create_directories(folder_);
         job.say = [this](const std::string& text) { said += text; };
+        job.warn = [this](const std::string& text) { warnings.push_back(text); };
         job.fellShort = [this](const std::string& text) { shortfalls.push_back(text); };
     }
     ~JobTest() override { fs::remove_all(folder_); }
@@ -44,11 +49,81 @@ class JobTest : public testing::Test {
 
     Job job;
     std::string said;
-    std::vector<std::string> shortfalls;
+    std::vector<std::string> shortfalls, warnings;
 
   private:
     fs::path folder_;
 };
+
+/// One on a device that is lost at the first box that it samples.
+class LostDevice : public Resampler {
+  public:
+    LostDevice() : Resampler({.name = "lost-device", .description = "for tests", .isOnDevice = true}) {}
+    double relativeCost() const override { return 1e-9; }
+    std::unique_ptr<BoundResampler> bind(const TetMesh&, std::span<const int>,
+                                         const BindOptions&) const override {
+        return std::make_unique<Bound>();
+    }
+
+  private:
+    struct Bound : BoundResampler {
+        ResampleStatistics resample(const Lattice&, std::span<const IndexBox>, const BlockSink&,
+                                    const Execution&) override {
+            throw GlError("OpenGL failed: the device was lost");
+        }
+    };
+};
+
+void addLostDevice() {
+    static const bool added = (registerResampler(std::make_unique<LostDevice>()), true);
+    EXPECT_TRUE(added);
+}
+
+constexpr const char* kGoesOn =
+    "lost-device failed here (OpenGL failed: the device was lost), so auto goes on with software";
+
+TEST_F(JobTest, aLostDeviceIsAnErrorWhereItWasAskedFor) {
+    addLostDevice();
+    ResampleRequest request = this->request();
+    request.algorithm = "lost-device";
+    EXPECT_THROW(resampleFiles(request, job), GlError);
+    EXPECT_FALSE(fs::exists(request.output));
+    EXPECT_TRUE(warnings.empty());
+}
+
+TEST_F(JobTest, autoGoesOnWithSoftwareWhenADeviceIsLost) {
+    addLostDevice();
+    ResampleRequest request = this->request();
+    const Json expected = resampleFiles(request, job);
+    request.algorithm = "auto";
+    const Json document = resampleFiles(request, job);
+    EXPECT_EQ(warnings, std::vector<std::string>{kGoesOn});
+    EXPECT_EQ(document["algorithm"], "software");
+    EXPECT_EQ(document["algorithm_reason"], kGoesOn);
+    EXPECT_EQ(document["error"], expected["error"]);
+    EXPECT_TRUE(verifyFile({kMesh, request.output}, job).holds());
+}
+
+TEST_F(JobTest, cutsAndTracesGoOnWithSoftwareWhenADeviceIsLost) {
+    addLostDevice();
+    CutRequest cut;
+    cut.input = kMesh;
+    cut.output = file("cut.png");
+    cut.cut.resolution = 32;
+    cut.algorithm = "auto";
+    EXPECT_EQ(cutMesh(cut, job).algorithm, "software");
+    std::ofstream(file("path.txt")) << "50 50 50\n60 50 50\n";
+    FocusTraceRequest trace;
+    trace.input = kMesh;
+    trace.path = file("path.txt");
+    trace.radiusWorld = 20;
+    trace.resolution = 32;
+    trace.algorithm = "auto";
+    const FocusTrace traced = traceFocus(trace, job);
+    EXPECT_EQ(traced.algorithm, "software");
+    EXPECT_EQ(traced.steps.size(), 2u);
+    EXPECT_EQ(warnings, (std::vector<std::string>{kGoesOn, kGoesOn}));
+}
 
 TEST_F(JobTest, writesAFileThatVerifies) {
     const ResampleRequest request = this->request();

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "tessera/error.h"
 
@@ -140,6 +141,19 @@ TEST(Registry, ANamedOneMustRunAndHaveTheOptions) {
     // A device that is missing is for the resampler to explain.
     options.target = "egl-surfaceless";
     EXPECT_EQ(choose({&plain, &quick}, "quick", options).resampler, &quick);
+}
+
+TEST(Registry, AutoGoesOnWithoutADeviceThatFailed) {
+    const std::optional<ResamplerChoice> other = chooseInstead(choose({&plain, &quick}, "auto"), "lost", {});
+    ASSERT_TRUE(other);
+    EXPECT_FALSE(other->resampler->info().isOnDevice);
+    EXPECT_EQ(other->reason, "quick failed here (lost), so auto goes on with " + other->resampler->name());
+    // Neither a failure that no device is to blame for nor one of an algorithm that was asked for by name.
+    EXPECT_FALSE(chooseInstead(choose({&plain, &slow}, "auto"), "lost", {}));
+    EXPECT_FALSE(chooseInstead(choose({&plain, &quick}, "quick"), "lost", {}));
+    BindOptions options;
+    options.format = SampleFormat::r8;
+    EXPECT_FALSE(chooseInstead(choose({&plain, &quick}, "auto", options), "lost", options));
 }
 
 TEST(Registry, TakesAnAlgorithmOfTheCallersOwn) {

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+#include <type_traits>
+
+#include "job/job.h"
+#include "tessera/error.h"
+#include "tessera/registry.h"
+
+namespace tessera {
+
+/// The resampler that a job works with. Where "auto" chose one on a device and that fails, the job goes on
+/// with the best that needs none.
+class AlgorithmChoice {
+  public:
+    /// Says what "auto" chose, and warns of drivers that crashed or stalled. Throws what chooseResampler
+    /// does, and GlError when "auto" is to take an OpenGL platform that can't be had.
+    AlgorithmChoice(const std::string& name, const BindOptions& options, Job& job);
+
+    const Resampler& resampler() const { return *choice_.resampler; }
+    const std::string& reason() const { return choice_.reason; }
+
+    /// work(resampler), and once more from its beginning where OpenGL fails on the way and "auto" can choose
+    /// another resampler. That is a warning then.
+    template <class Work>
+    auto run(const Work& work) -> std::invoke_result_t<const Work&, const Resampler&> {
+        try {
+            return work(resampler());
+        } catch (const GlError& error) {
+            if (!replace(error.what())) throw;
+        }
+        return work(resampler());
+    }
+
+  private:
+    bool replace(const std::string& failure);
+
+    BindOptions options_;
+    Job& job_;
+    ResamplerChoice choice_;
+};
+
+/// Warns of drivers of OpenGL that crashed or stalled when they were tried.
+void warnOfDrivers(Job& job);
+
+/// Throws GlError with the reason when `target` is an OpenGL platform that can't be had.
+void checkGlTarget(const std::string& target);
+
+}  // namespace tessera

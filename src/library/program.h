@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+namespace tessera {
+
+bool isProgram(const std::string& path);
+
+/// The installed program tessera: the one of useProgram, or else in PATH. Empty: there is none.
+std::string findProgram();
+
+/// Has that program, where there is one, try drivers before an algorithm uses them in this process.
+void tryDriversFor(const std::string& algorithm);
+
+}  // namespace tessera
