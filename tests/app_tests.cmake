@@ -9,7 +9,7 @@ if(TARGET tessera)
   endforeach()
   if(TARGET tessera_view_program)
     add_test(NAME window_test COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/view/window_test.py --tessera $<TARGET_FILE:tessera>
-      --data ${PROJECT_SOURCE_DIR}/data)
+      --data ${PROJECT_SOURCE_DIR}/data --broken-drivers ${CMAKE_CURRENT_BINARY_DIR}/broken_driver)
   endif()
   # What the tests in Python run, beside tessera: it looks for the reading process where it is itself.
   tessera_program(forked_tessera PRECOMPILED tessera_app_precompiled SOURCES app/forked_tessera.cpp PRIVATE_LINK tessera_app)

@@ -5,7 +5,7 @@ tessera_test(gl_trial_test FOLDER gl LINK gl)
 tessera_program(gl_trial_program SOURCES gl/gl_trial_program.cpp LINK gl)
 add_dependencies(gl_trial_test gl_trial_program)
 # Drivers that go wrong, in folders for LD_LIBRARY_PATH; not sanitized, as real ones aren't.
-foreach(library EGL:egl:libEGL.so.1 OSMESA:osmesa:libOSMesa.so.8)
+foreach(library EGL:egl:libEGL.so.1 OSMESA:osmesa:libOSMesa.so.8 GL:gl:libGL.so.1)
   string(REPLACE ":" ";" library ${library})
   list(GET library 0 macro)
   list(GET library 1 folder)

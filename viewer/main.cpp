@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "gl/gl_platform.h"
 #include "job/wrap_text.h"
@@ -16,6 +17,8 @@ namespace {
 
 volatile std::sig_atomic_t wasInterrupted = 0;
 
+/// The first word of the process that tries whether a window can be opened.
+constexpr const char* kTryWindowCommand = "try-window";
 constexpr int kExitFailure = 1;
 constexpr int kExitBadInput = 2;
 
@@ -28,6 +31,14 @@ std::string programBeside() {
     std::error_code error;
     const auto candidate = std::filesystem::canonical("/proc/self/exe", error).parent_path() / "tessera";
     return !error && std::filesystem::is_regular_file(candidate, error) ? candidate.string() : std::string();
+}
+
+/// How the display's driver crashed or stalled in a process that tried it; empty where it didn't.
+std::string windowFault() {
+    using namespace tessera;
+    const std::vector<std::string> words{"window"};
+    const GlTrialResult result = tryDrivers({"/proc/self/exe", {kTryWindowCommand}}, words)[0];
+    return result.isFault ? result.reason : std::string();
 }
 
 int view(int argc, char** argv) {
@@ -92,6 +103,8 @@ int view(int argc, char** argv) {
     ViewSession session(job, options);
     session.document() = std::move(document);
     if (!input.empty()) session.open(input);  // read while the window opens
+    if (const std::string fault = windowFault(); !fault.empty())
+        throw GlError("no window can be opened: " + fault);
     Window shown(session, window);
     std::signal(SIGINT, [](int) { wasInterrupted = 1; });
     std::signal(SIGTERM, [](int) { wasInterrupted = 1; });
@@ -103,6 +116,9 @@ int view(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     try {
+        if (argc > 1 && std::string(argv[1]) == kTryWindowCommand)
+            return tessera::serveTrial(std::vector<std::string>(argv + 2, argv + argc),
+                                       [](const std::string&) { tessera::tryWindow(); });
         return view(argc, argv);
     } catch (const tessera::InputError& error) {
         printError(error.what());

@@ -57,6 +57,25 @@ int keyOnLayout(int key, int scancode) {
     return isLetter ? GLFW_KEY_A + (name[0] - 'a') : key;
 }
 
+/// Its context is current. Throws IoError.
+GLFWwindow* openWindow(int width, int height, bool isShown) {
+    glfwSetErrorCallback([](int, const char* text) { lastError = text; });
+    if (!glfwInit()) throw IoError("no window can be opened: " + lastError);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
+    glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // so that a loss can be told
+    glfwWindowHint(GLFW_VISIBLE, isShown ? GLFW_TRUE : GLFW_FALSE);
+    GLFWwindow* window = glfwCreateWindow(width, height, "Tessera", nullptr, nullptr);
+    if (!window) {
+        glfwTerminate();
+        throw IoError("no window with OpenGL 4.5 can be opened: " + lastError);
+    }
+    glfwMakeContextCurrent(window);
+    return window;
+}
+
 double msBetween(Clock::time_point from, Clock::time_point to) {
     return std::chrono::duration<double, std::milli>(to - from).count();
 }
@@ -65,6 +84,17 @@ double msSince(Clock::time_point then) {
 }
 
 }  // namespace
+
+void tryWindow() {
+    GLFWwindow* window = openWindow(64, 64, false);
+    const GlFunctions gl = loadGlFunctions([](const char* name) { return glfwGetProcAddress(name); });
+    gl.ClearColor(1, 1, 1, 1);
+    gl.Clear(GL_COLOR_BUFFER_BIT);
+    glfwSwapBuffers(window);
+    gl.Finish();
+    glfwDestroyWindow(window);
+    glfwTerminate();
+}
 
 // What GLFW and OpenGL have of the window.
 struct Window::Screen {
@@ -113,21 +143,9 @@ struct Window::Screen {
 
 Window::Window(ViewSession& session, const WindowOptions& options)
     : session_(session), screen_(std::make_unique<Screen>()) {
-    glfwSetErrorCallback([](int, const char* text) { lastError = text; });
-    if (!glfwInit()) throw IoError("no window can be opened: " + lastError);
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
-    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
-    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-    glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-    glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);  // so that a loss can be told
-    GLFWwindow* window = glfwCreateWindow(options.width, options.height, "Tessera", nullptr, nullptr);
-    if (!window) {
-        glfwTerminate();
-        throw IoError("no window with OpenGL 4.5 can be opened: " + lastError);
-    }
+    GLFWwindow* window = openWindow(options.width, options.height, true);
     Screen& screen = *screen_;
     glfwSetWindowUserPointer(window, &screen);
-    glfwMakeContextCurrent(window);
     glfwSwapInterval(0);
     glfwSetWindowSizeLimits(window, 480, 320, GLFW_DONT_CARE, GLFW_DONT_CARE);
     glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {

@@ -15,6 +15,10 @@ struct WindowOptions {
     std::string scenePath = "scene.json", picturePath = "picture.png";  ///< where the buttons save
 };
 
+/// Opens a window that isn't shown, and draws into it: for a process that tries whether its driver can.
+/// Throws IoError as Window does.
+void tryWindow();
+
 /// The window around a session: draws what it shows, and turns keys and the mouse into changes of the scene.
 class Window {
   public:

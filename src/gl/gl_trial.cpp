@@ -94,13 +94,13 @@ void drawTexels(GlContext& context) {
 /// A process under trial.
 class Trial {
   public:
-    Trial(const GlTrial& trial, GlPlatform platform) : seconds_(trial.seconds) {
+    Trial(const GlTrial& trial, const std::string& word) : seconds_(trial.seconds) {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) failToStart(kTask, "pipe", errno);
         reason_ = Descriptor(ends[0]);
         const Descriptor childEnd(ends[1]);
         std::vector<std::string> words = trial.arguments;
-        words.emplace_back(nameOf(platform));
+        words.push_back(word);
         words.push_back(std::to_string(::getpid()));
         child_.emplace(ChildStart{kTask, trial.executable, words, {childEnd.get()}, {}});
     }
@@ -139,12 +139,12 @@ void write(std::string_view text) {
 
 }  // namespace
 
-std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms) {
-    std::vector<GlTrialResult> results(platforms.size());
-    std::vector<std::optional<Trial>> trials(platforms.size());
-    for (std::size_t i = 0; i < platforms.size(); ++i) {
+std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words) {
+    std::vector<GlTrialResult> results(words.size());
+    std::vector<std::optional<Trial>> trials(words.size());
+    for (std::size_t i = 0; i < words.size(); ++i) {
         try {
-            trials[i].emplace(trial, platforms[i]);
+            trials[i].emplace(trial, words[i]);
         } catch (const IoError& error) {
             results[i].reason = error.what();
         }
@@ -153,7 +153,7 @@ std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatfor
     Timer timer;
     while (true) {
         bool isDone = true;
-        for (std::size_t i = 0; i < platforms.size(); ++i) {
+        for (std::size_t i = 0; i < words.size(); ++i) {
             if (!trials[i]) continue;
             if (std::optional<GlTrialResult> result = trials[i]->result(spentMs)) {
                 results[i] = std::move(*result);
@@ -169,7 +169,7 @@ std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatfor
     }
 }
 
-int serveGlTrial(std::span<const std::string> arguments) {
+int serveTrial(std::span<const std::string> arguments, const std::function<void(const std::string&)>& use) {
     std::int64_t parent = 0;
     const std::string number = arguments.size() == 2 ? arguments[1] : "";
     const auto parsed = std::from_chars(number.data(), number.data() + number.size(), parent);
@@ -178,14 +178,26 @@ int serveGlTrial(std::span<const std::string> arguments) {
     settleAsChild(parent);
     write(kGreeting);
     try {
-        GlContext context(parseGlPlatform(arguments[0]));
-        drawTexels(context);
+        use(arguments[0]);
         write(kWorks);
     } catch (const std::exception& error) {
         write(std::string_view(error.what()).substr(0, kLongestReason));
         return kExitUnavailable;
     }
     return 0;
+}
+
+std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms) {
+    std::vector<std::string> names;
+    for (const GlPlatform platform : platforms) names.emplace_back(nameOf(platform));
+    return tryDrivers(trial, names);
+}
+
+int serveGlTrial(std::span<const std::string> arguments) {
+    return serveTrial(arguments, [](const std::string& name) {
+        GlContext context(parseGlPlatform(name));
+        drawTexels(context);
+    });
 }
 
 }  // namespace tessera

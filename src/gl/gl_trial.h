@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,13 +28,20 @@ struct GlTrialResult {
     bool isFault = false;  ///< the driver crashed or stalled
 };
 
-/// Tries the platforms at once, each in a process of its own: makes a context, compiles shaders, draws and
-/// reads back. A program that knows nothing of trials gives no reason. @throws Cancelled.
-std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms);
+/// Tries drivers at once, each in a process of its own, which is told one of the words and does what
+/// serveTrial's caller does for that. A program that knows nothing of trials gives no reason.
+/// @throws Cancelled.
+std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words);
 
-/// The other side of tryGl, to be called before anything else in the program that it starts. Returns the exit
-/// code; return it from main, as drivers tidy up behind it. @throws InputError when it wasn't started by
-/// tryGl. @param arguments those behind GlTrial::arguments.
+/// The other side of tryDrivers, to be called before anything else in the program that it starts: calls `use`
+/// with the word. What that throws is the reason. Returns the exit code; return it from main, as drivers tidy
+/// up behind it. @throws InputError when it wasn't started by tryDrivers.
+/// @param arguments those behind GlTrial::arguments.
+int serveTrial(std::span<const std::string> arguments, const std::function<void(const std::string&)>& use);
+
+/// tryDrivers for platforms: makes a context, compiles shaders, draws and reads back.
+std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms);
+/// serveTrial for platforms.
 int serveGlTrial(std::span<const std::string> arguments);
 
 }  // namespace tessera

@@ -1,6 +1,6 @@
-// libEGL.so.1 and libOSMesa.so.8 as broken drivers have them, for tests that put their folders into
-// LD_LIBRARY_PATH. They hand everything on to the real library, TESSERA_REAL_LIBRARY, but what
-// TESSERA_BROKEN_DRIVER names.
+// libEGL.so.1, libOSMesa.so.8 and libGL.so.1 as broken drivers have them, for tests that put their folders
+// into LD_LIBRARY_PATH. The last one can do no more than crash when it is loaded. They hand everything on to
+// the real library, TESSERA_REAL_LIBRARY, but what TESSERA_BROKEN_DRIVER names.
 
 #include <EGL/egl.h>
 #include <GL/glcorearb.h>
@@ -109,7 +109,9 @@ HAND_ON(EGLBoolean, eglMakeCurrent,
         (display, draw, read, context))
 HAND_ON(EGLBoolean, eglReleaseThread, (), ())
 HAND_ON(EGLint, eglGetError, (), ())
-#else
+#endif
+
+#ifdef TESSERA_BREAK_OSMESA
 using Context = struct osmesa_context*;
 extern "C" [[gnu::visibility("default")]] Function OSMesaGetProcAddress(const char* name) {
     static auto* const function = real<Function(const char*)>("OSMesaGetProcAddress");

@@ -1,6 +1,6 @@
 """The window from outside: a display without a screen, a window manager, and real events of keys and mouse.
 
-window_test.py --tessera PROGRAM --data FOLDER [--mesh FILE --field NAME] [--keep FOLDER]
+window_test.py --tessera PROGRAM --data FOLDER --broken-drivers FOLDER [--mesh FILE --field NAME] [--keep FOLDER]
 """
 import argparse
 import json
@@ -232,6 +232,12 @@ class Window(unittest.TestCase):
         self.assertEqual(self.program.wait(PATIENCE), 0)
         self.assertEqual((self.folder / "errors").read_text(), "")
 
+    def test_a_crash_of_the_display_s_driver_is_one_line(self):
+        environment = {**self.environment, "LD_LIBRARY_PATH": f"{arguments.broken_drivers}/gl", "TESSERA_BROKEN_DRIVER": "load"}
+        result = subprocess.run([arguments.tessera, "view"], env=environment, capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual((result.returncode, result.stderr),
+                         (1, "tessera: no window can be opened: the driver crashed (signal 11, Segmentation fault)\n"))
+
     def test_without_a_display_there_is_one_line(self):
         environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
         result = subprocess.run([arguments.tessera, "view"], env=environment, capture_output=True, text=True, timeout=PATIENCE)
@@ -249,6 +255,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--tessera", required=True)
     parser.add_argument("--data", required=True)
+    parser.add_argument("--broken-drivers", required=True)
     parser.add_argument("--mesh")
     parser.add_argument("--field")
     parser.add_argument("--keep")
