@@ -25,10 +25,13 @@ if(TARGET tessera)
   add_test(NAME mutated_meshes
     COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/run_mutated.py --tessera $<TARGET_FILE:tessera>
             --writer $<TARGET_FILE:write_box_files> --count 12 --seed 1 --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutants)
+  add_test(NAME escape_test
+    COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/app/escape_test.py --tessera $<TARGET_FILE:tessera>
+            --box-writer $<TARGET_FILE:write_box_files> --link-writer $<TARGET_FILE:write_linked_files> --jobs 2)
   add_test(NAME kill_test
     COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/kill_test.py --tessera $<TARGET_FILE:tessera> --data ${PROJECT_SOURCE_DIR}/data
             --count 20 --seed 1)
-  set_tests_properties(mutated_meshes kill_test PROPERTIES PROCESSORS 2)
+  set_tests_properties(mutated_meshes escape_test kill_test PROPERTIES PROCESSORS 2)
   add_test(NAME random_plans
     COMMAND ${TESSERA_PYTHON} -B ${CMAKE_CURRENT_SOURCE_DIR}/random_plans.py --tessera $<TARGET_FILE:tessera> --seeds 1-25
             --keep ${PROJECT_BINARY_DIR}/plans)

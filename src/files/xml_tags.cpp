@@ -15,7 +15,6 @@ constexpr std::string_view kSpaces = " \t\r\n";
 constexpr std::size_t kQuotedCharacters = 24;
 
 constexpr std::size_t kLongestTag = 1 << 20;
-constexpr std::size_t kLongestEntity = 12;
 
 struct Entity {
     std::string_view name;
@@ -82,8 +81,13 @@ std::optional<XmlTag> XmlTags::next() {
             at_ = behind("-->", begin);
             continue;
         }
-        if (head[1] == '!' || head[1] == '?' || head[1] == '/') {
-            at_ = behind(">", begin);
+        if (head.starts_with("<?") || head.starts_with("</")) {
+            at_ = behind(head[1] == '?' ? "?>" : ">", begin);
+            continue;
+        }
+        if (head[1] == '!') {
+            if (!file_.bytesFrom(begin, 9).starts_with("<![CDATA[")) refuseDeclaration(file_.path(), begin);
+            at_ = behind("]]>", begin);
             continue;
         }
         const std::size_t close = closeOf(begin);
@@ -96,29 +100,37 @@ std::optional<XmlTag> XmlTags::next() {
     }
 }
 
+void refuseDeclaration(const std::string& path, std::size_t byte) {
+    throw InputError(path + ": byte " + std::to_string(byte) +
+                     ": a declaration of a document's type or its entities; VTK's files have none");
+}
+
 std::optional<std::string_view> attributeOf(std::string_view tag, std::string_view name) {
-    for (std::size_t at = tag.find(name); at != std::string_view::npos; at = tag.find(name, at + 1)) {
-        if (at == 0 || kSpaces.find(tag[at - 1]) == std::string_view::npos) continue;
-        std::size_t next = tag.find_first_not_of(kSpaces, at + name.size());
-        if (next == std::string_view::npos || tag[next] != '=') continue;
-        next = tag.find_first_not_of(kSpaces, next + 1);
-        if (next == std::string_view::npos || (tag[next] != '"' && tag[next] != '\'')) continue;
-        const std::size_t close = tag.find(tag[next], next + 1);
+    std::size_t at = tag.find_first_of(kSpaces);
+    while (true) {
+        at = std::min(tag.find_first_not_of(kSpaces, at), tag.size());
+        const std::size_t equals = tag.find('=', at);
+        const std::size_t open = tag.find_first_not_of(kSpaces, std::min(equals, tag.size() - 1) + 1);
+        if (equals == std::string_view::npos || open == std::string_view::npos) return std::nullopt;
+        const std::size_t close =
+            tag[open] == '"' || tag[open] == '\'' ? tag.find(tag[open], open + 1) : std::string_view::npos;
         if (close == std::string_view::npos) return std::nullopt;
-        return tag.substr(next + 1, close - next - 1);
+        std::string_view found = tag.substr(at, equals - at);
+        found = found.substr(0, found.find_last_not_of(kSpaces) + 1);
+        if (found == name) return tag.substr(open + 1, close - open - 1);
+        at = close + 1;
     }
-    return std::nullopt;
 }
 
 std::string decodeEntities(std::string_view text) {
     std::string result;
     for (std::size_t at = 0; at < text.size();) {
-        const std::size_t end = text.substr(at, kLongestEntity).find(';');
+        const std::size_t end = text[at] == '&' ? text.find_first_of("&;", at + 1) : std::string_view::npos;
         std::string character;
-        if (text[at] == '&' && end != std::string_view::npos)
-            character = decodeEntity(text.substr(at + 1, end - 1));
+        if (end != std::string_view::npos && text[end] == ';')
+            character = decodeEntity(text.substr(at + 1, end - at - 1));
         result += character.empty() ? std::string{text[at]} : character;
-        at += character.empty() ? 1 : end + 1;
+        at = character.empty() ? at + 1 : end + 1;
     }
     return result;
 }

@@ -17,12 +17,13 @@ struct XmlTag {
     std::string_view name() const;
 };
 
-/// Start tags of an XML file in their order, comments and declarations left out.
+/// Start tags of an XML file in their order; comments, instructions and character data are left out.
 class XmlTags {
   public:
     /// @param end tags begin before this byte.
     XmlTags(InputFile& file, std::size_t from, std::size_t end) : file_(file), at_(from), end_(end) {}
-    /// Nothing when there is no further whole tag. Throws InputError for a tag of more than a mebibyte.
+    /// Nothing when there is no further whole tag. Throws InputError for a tag of more than a mebibyte,
+    /// and for a declaration of types or entities: then the markup isn't what it looks like.
     std::optional<XmlTag> next();
 
   private:
@@ -33,7 +34,10 @@ class XmlTags {
     std::size_t at_, end_;
 };
 
-/// Value of an attribute in a tag's text.
+/// Throws the InputError of XmlTags::next for a declaration.
+[[noreturn]] void refuseDeclaration(const std::string& path, std::size_t byte);
+
+/// Value of an attribute in a tag's text, which begins with the tag's name.
 std::optional<std::string_view> attributeOf(std::string_view tag, std::string_view name);
 
 /// An attribute's value as it is meant: &amp; and the other four entities of XML, &#38; and &#x26; become

@@ -127,7 +127,7 @@ RenderedFrames renderFrames(const FramesRequest& request, Job& job) {
     const std::vector<std::string> outputs = checkedOutputs(request, job);
     std::optional<CameraPath> path;
     if (!request.path.empty()) path = readCameraPath(request.path);
-    const Scene scene = sceneOf(request.picture);
+    const Scene scene = sceneOf(request.picture, job);
     const bool hasOwnRange = scene.function.range || !scene.function.stops.empty();
     if (request.inputs.size() > 1 && !hasOwnRange)
         job.warn("each file has colours by the range of its own values: transfer_function.range fixes them");

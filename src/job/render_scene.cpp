@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "files/atomic_file.h"
+#include "files/named_file.h"
 #include "job/algorithm_choice.h"
 #include "job/describe_files.h"
 #include "job/import_mesh.h"
@@ -28,8 +29,10 @@ constexpr std::int64_t kMostPixels = 200'000'000;
 
 }  // namespace
 
-Scene sceneOf(const RenderRequest& request) {
+Scene sceneOf(const RenderRequest& request, const Job& job) {
     Scene scene = request.scene.empty() ? Scene{} : readScene(request.scene);
+    if (!scene.outline.mesh.empty() && !job.followsLinks)
+        checkInFolder(folderOf(request.scene), request.scene, scene.outline.mesh);
     if (request.field) scene.field = *request.field;
     if (request.component) scene.component = request.component;
     if (request.size) scene.width = (*request.size)[0], scene.height = (*request.size)[1];
@@ -192,7 +195,7 @@ RenderedPicture renderScene(const RenderRequest& request, Job& job) {
     chooseFormat(request.output, {}, {"png", "exr"});
     checkWritable(request.output);
     checkReportPath(job);
-    const Scene scene = sceneOf(request);
+    const Scene scene = sceneOf(request, job);
     try {
         return drawScene(request, scene, job);
     } catch (const InputError& error) {

@@ -55,8 +55,9 @@ struct RenderedPicture {
     std::vector<EffectCost> effects;  ///< when asked for
 };
 
-/// The scene of a request, with what the request has in its place. Throws InputError, IoError.
-Scene sceneOf(const RenderRequest& request);
+/// The scene of a request, with what the request has in its place. Throws InputError, also for a scene that
+/// names a file outside its folder where the job doesn't follow links, and IoError.
+Scene sceneOf(const RenderRequest& request, const Job& job);
 /// A .vdb file, or a mesh whose bricks have come to rest. Throws as openVdbSource() and MeshSource do.
 std::unique_ptr<PictureSource> openPictureSource(const std::string& input, const Scene& scene,
                                                  GlThread& thread, Job& job);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -15,57 +16,93 @@ namespace tessera {
 
 namespace {
 
-constexpr std::string_view kSpaces = " \t\r\v\f";
-constexpr std::size_t kLongestCase = 1 << 20;
-constexpr int kMostFiles = 100000;
+constexpr std::string_view kSpaces = " \t\r\n\v\f";
+constexpr std::size_t kLongestCase = 16 << 20;
+constexpr std::size_t kMostFiles = 1000000, kMostListed = 10000000;
 
-/// The last word of a line, with * for the digits of a step: there a file's name stands. Empty for a line of
-/// one word.
-std::string lastWord(std::string_view line) {
-    const std::size_t end = line.find_last_not_of(kSpaces);
-    if (end == std::string_view::npos) return {};
-    line = line.substr(0, end + 1);
-    const std::size_t space = line.find_last_of(kSpaces);
-    return space == std::string_view::npos ? std::string() : std::string(line.substr(space + 1));
-}
-
-/// Those in one folder whose names are `pattern` with any one character for each *.
-std::vector<std::filesystem::path> filesLike(const std::filesystem::path& folder,
-                                             const std::string& pattern) {
-    std::vector<std::filesystem::path> files;
-    std::error_code error;
-    int looked = 0;
-    for (std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error), end;
-         !error && entry != end && looked < kMostFiles; entry.increment(error), ++looked) {
-        const std::string name = entry->path().filename().string();
-        const bool fits = name.size() == pattern.size() &&
-                          std::equal(name.begin(), name.end(), pattern.begin(),
-                                     [](char c, char like) { return c == like || like == '*'; });
-        if (fits) files.push_back(folder / name);
+/// Calls `use` with each word.
+template <class Use>
+void forEachWord(std::string_view text, const Use& use) {
+    while (true) {
+        text.remove_prefix(std::min(text.find_first_not_of(kSpaces), text.size()));
+        if (text.empty()) return;
+        const std::string_view word = text.substr(0, text.find_first_of(kSpaces));
+        use(word);
+        text.remove_prefix(word.size());
     }
-    std::sort(files.begin(), files.end());
-    return files;
 }
 
-std::vector<std::filesystem::path> filesNamed(const std::string& casePath, const std::string& name,
-                                              const std::optional<std::string>& folder) {
-    const std::filesystem::path path = std::filesystem::path(casePath).parent_path() / name;
-    const std::string pattern = path.filename().string();
-    if (pattern.find('*') == std::string::npos) return {path};
-    // What lies elsewhere can't be listed by a process that has given that up.
-    std::error_code error;
-    if (folder && std::filesystem::is_directory(path.parent_path(), error))
-        checkInFolder(*folder, casePath, path.parent_path().string());
-    return filesLike(path.parent_path(), pattern);
+/// Whether the name is the pattern with any characters for each *.
+bool fits(std::string_view name, std::string_view pattern) {
+    std::size_t n = 0, p = 0, star = std::string_view::npos, behindStar = 0;
+    while (n < name.size()) {
+        if (p < pattern.size() && pattern[p] == '*') {
+            star = p++;
+            behindStar = n;
+        } else if (p < pattern.size() && pattern[p] == name[n]) {
+            ++p, ++n;
+        } else if (star != std::string_view::npos) {
+            p = star + 1;
+            n = ++behindStar;
+        } else {
+            return false;
+        }
+    }
+    return pattern.find_first_not_of('*', p) == std::string_view::npos;
 }
 
-/// 0 for a folder: the last word of a line need not mean a file.
-std::int64_t checkedSize(const std::string& casePath, const std::filesystem::path& file) {
+/// What the words of a case name.
+class NamedFiles {
+  public:
+    NamedFiles(const std::string& casePath, const std::optional<std::string>& folder)
+        : casePath_(casePath), folder_(folder) {}
+
+    std::vector<std::string> find(std::string_view word) {
+        found_.clear();
+        // As VTK's reader has it: behind the case's folder, whatever the name begins with.
+        const std::string parent = std::filesystem::path(casePath_).parent_path().string();
+        addFiles(parent.empty() ? "" : parent + "/", word);
+        if (word.starts_with('/')) addFiles("", word);
+        return found_;
+    }
+
+  private:
+    /// Adds what fits, one folder of the name after the other.
+    void addFiles(const std::string& before, std::string_view rest) {
+        const std::size_t star = rest.find('*');
+        if (star == std::string_view::npos) {
+            found_.push_back(before + std::string(rest));
+            return;
+        }
+        const std::size_t slash = rest.find_last_of('/', star);
+        const std::size_t begin = slash == std::string_view::npos ? 0 : slash + 1;
+        const std::string place = before + std::string(rest.substr(0, begin));
+        const std::string_view behind = rest.substr(begin), pattern = behind.substr(0, behind.find('/'));
+        std::error_code error;
+        // What lies elsewhere can't be listed by a process that has given that up.
+        if (folder_ && std::filesystem::is_directory(place.empty() ? "." : place, error))
+            checkInFolder(*folder_, casePath_, place.empty() ? "." : place);
+        for (std::filesystem::directory_iterator entry(place.empty() ? "." : place, error), end;
+             !error && entry != end; entry.increment(error)) {
+            if (++listed_ > kMostListed) throw InputError(casePath_ + ": its patterns fit too many files");
+            const std::string name = entry->path().filename().string();
+            if (fits(name, pattern)) addFiles(place + name, behind.substr(pattern.size()));
+        }
+    }
+
+    const std::string& casePath_;
+    const std::optional<std::string>& folder_;
+    std::vector<std::string> found_;
+    std::size_t listed_ = 0;
+};
+
+/// Nothing for a folder, or where no file is: not every word means one.
+std::optional<std::int64_t> checkedSize(const std::string& casePath, const std::string& file) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(file, error);
     if (std::filesystem::is_other(status))
-        throw InputError(casePath + ": names " + file.string() + ", which isn't a regular file");
-    if (!std::filesystem::is_regular_file(status)) return 0;
+        throw InputError(casePath + ": names " + file + ", which isn't a regular file");
+    if (!std::filesystem::is_regular_file(status)) return std::nullopt;
     const auto bytes = std::filesystem::file_size(file, error);
     return error ? 0 : std::int64_t(bytes);
 }
@@ -93,20 +130,21 @@ EnSightCase checkEnSightCase(const std::string& path, const std::optional<std::s
     EnSightCase found;
     found.bytes = std::int64_t(file.size());
     const std::string text = file.copy(0, kLongestCase);
-    int files = 0;
-    for (std::string_view rest = text; !rest.empty() && files < kMostFiles;) {
-        const std::string_view line = rest.substr(0, rest.find('\n'));
-        rest.remove_prefix(std::min(line.size() + 1, rest.size()));
-        const std::string name = lastWord(line);
-        if (name.empty()) continue;
-        for (const std::filesystem::path& named : filesNamed(path, name, folder)) {
-            const std::int64_t bytes = checkedSize(path, named);
-            if (bytes > 0 && folder) checkInFolder(*folder, path, named.string());
-            found.bytes += bytes;
-            if (bytes > 0) found.named.emplace(named.string(), bytes);
-            if (++files == kMostFiles) break;
+    if (text.size() < file.size())
+        throw InputError(path + ": an EnSight case file of more than 16 MiB isn't read");
+    if (text.find('\0') != std::string::npos)
+        throw InputError(path + ": isn't an EnSight case file: it has a byte of zero");
+    NamedFiles files(path, folder);
+    forEachWord(text, [&](std::string_view word) {
+        for (const std::string& named : files.find(word)) {
+            const std::optional<std::int64_t> bytes = checkedSize(path, named);
+            if (!bytes) continue;
+            if (folder) checkInFolder(*folder, path, named);
+            if (*bytes == 0 || !found.named.emplace(named, *bytes).second) continue;
+            found.bytes += *bytes;
+            if (found.named.size() > kMostFiles) throw InputError(path + ": names too many files");
         }
-    }
+    });
     return found;
 }
 

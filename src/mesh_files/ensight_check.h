@@ -14,7 +14,7 @@ struct EnSightCase {
     std::map<std::string, std::int64_t> named;  ///< path and bytes of those named; none is empty
 };
 /// Throws InputError when one of the files is a pipe or a device, at which VTK's reader would wait for ever,
-/// or lies outside `folder`. A * in a file's name, not in a folder's, is any one character.
+/// or lies outside `folder`. Any word of the case may be a file's name; a run of * in one is any characters.
 EnSightCase checkEnSightCase(const std::string& path, const std::optional<std::string>& folder);
 
 /// A sentence when some of the files end as none does that was written to its end, within a line of text or a

@@ -116,9 +116,16 @@ std::optional<std::string> allowedFolder(const std::string& path, const ReadOpti
     return options.folder.empty() ? folderOf(path) : options.folder;
 }
 
+void checkParts(const std::string& path, const ReadOptions& options) {
+    if (options.followsLinks || options.folder.empty()) return;
+    checkInFolder(options.folder, options.folder, path);
+    for (const std::string& part : options.otherParts) checkInFolder(options.folder, options.folder, part);
+}
+
 MeshFile readByFormat(const std::string& path, const ReadOptions& options, const Execution& execution,
                       OpenVtkFormat openOther) {
     execution.throwIfCancelled();
+    checkParts(path, options);
     RawMesh raw = readRaw(path, options, execution, openOther);
     if (!options.otherParts.empty()) warnOfEmptyPart(raw, path, raw.statistics);
     for (std::size_t p = 0; p < options.otherParts.size(); ++p) {

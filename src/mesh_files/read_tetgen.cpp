@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -183,6 +184,9 @@ RawMesh readTetgen(const std::string& path, const ReadOptions& options) {
     const std::filesystem::path given(path);
     const std::string nodePath = std::filesystem::path(given).replace_extension(".node").string();
     const std::string elementPath = std::filesystem::path(given).replace_extension(".ele").string();
+    if (const auto folder = allowedFolder(path, options))
+        for (const std::string& other : {nodePath, elementPath})
+            if (other != path) checkInFolder(*folder, path, other);
     const std::string nodes = readWholeFile(nodePath), elements = readWholeFile(elementPath);
     return parseTetgen({nodePath, nodes}, {elementPath, elements}, options);
 }

@@ -155,7 +155,8 @@ VtkSource openLegacy(const std::string& path) {
 }
 
 /// Runs the reader for the time step that the options choose.
-void update(const std::string& path, vtkAlgorithm* reader, const ReadOptions& options) {
+void update(const std::string& path, const VtkSource& source, const ReadOptions& options) {
+    vtkAlgorithm* reader = source.reader;
     reader->UpdateInformation();
     vtkInformation* information = reader->GetOutputInformation(0);
     const int steps = information && information->Has(vtkStreamingDemandDrivenPipeline::TIME_STEPS())
@@ -169,7 +170,9 @@ void update(const std::string& path, vtkAlgorithm* reader, const ReadOptions& op
         return;
     }
     const double* times = information->Get(vtkStreamingDemandDrivenPipeline::TIME_STEPS());
-    reader->UpdateTimeStep(times[options.timeStep < 0 ? steps - 1 : options.timeStep]);
+    const double time = times[options.timeStep < 0 ? steps - 1 : options.timeStep];
+    if (source.checkTime) source.checkTime(time);
+    reader->UpdateTimeStep(time);
 }
 
 void throwOnErrors(const std::string& path, const VtkMessages& messages) {
@@ -225,7 +228,7 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
         selectArrays(xml->GetCellDataArraySelection(), FieldLocation::cell, options, unread);
     }
     throwOnErrors(path, messages);
-    update(path, opened.reader, options);
+    update(path, opened, options);
     throwOnErrors(path, messages);
     vtkDataObject* data = opened.reader->GetOutputDataObject(0);
     if (!data) throw InputError(path + ": could not be read as " + opened.format);

@@ -10,6 +10,7 @@
 #include "base/check.h"
 #include "mesh_files/ensight_check.h"
 #include "mesh_files/foam_check.h"
+#include "mesh_files/foam_files.h"
 #include "mesh_files/open_check.h"
 #include "mesh_files/vtk_source.h"
 
@@ -67,7 +68,9 @@ VtkSource openEnSight(const std::string& path, const ReadOptions& options) {
     return {reader, "EnSight", {}, std::move(warnings)};
 }
 
-VtkSource openFoam(const std::string& path) {
+VtkSource openFoam(const std::string& path, const ReadOptions& options) {
+    const std::optional<std::string> folder = allowedFolder(path, options);
+    checkFoamFiles(path, folder);
     std::vector<std::string> warnings = checkFoamCase(path);
     auto reader = vtkSmartPointer<vtkOpenFOAMReader>::New();
     reader->SetFileName(path.c_str());
@@ -83,7 +86,9 @@ VtkSource openFoam(const std::string& path) {
         const std::string name = reader->GetPatchArrayName(i);
         if (name.ends_with("/internalMesh")) reader->SetPatchArrayStatus(name.c_str(), 1);
     }
-    return {reader, "OpenFOAM", {}, std::move(warnings)};
+    VtkSource source{reader, "OpenFOAM", {}, std::move(warnings)};
+    if (folder) source.checkTime = [path, folder](double time) { checkFoamTime(path, *folder, time); };
+    return source;
 }
 
 }  // namespace
@@ -97,7 +102,7 @@ VtkSource openSolverFormat(const std::string& path, VtkFormat format, const Read
         case VtkFormat::ensight:
             return openEnSight(path, options);
         case VtkFormat::openfoam:
-            return openFoam(path);
+            return openFoam(path, options);
         default:
             TESSERA_CHECK(false, "a format of a solver");
     }

@@ -3,6 +3,7 @@
 #include <vtkAlgorithm.h>
 #include <vtkSmartPointer.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,8 +23,9 @@ struct VtkSource {
     vtkSmartPointer<vtkAlgorithm> reader;
     std::string format;
     std::string nodeIds{};  ///< the array with the file's number of every point, where blocks share points
-    std::vector<std::string> warnings{};       ///< what is odd about the file, a sentence each
-    std::shared_ptr<RenamedFields> renamed{};  ///< after reading; null where names are taken as they are
+    std::vector<std::string> warnings{};           ///< what is odd about the file, a sentence each
+    std::shared_ptr<RenamedFields> renamed{};      ///< after reading; null where names are taken as they are
+    std::function<void(double time)> checkTime{};  ///< before that time is read; throws InputError
 };
 
 }  // namespace tessera

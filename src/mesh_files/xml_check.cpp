@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <charconv>
 #include <filesystem>
 #include <optional>
@@ -20,6 +21,7 @@ namespace {
 
 constexpr std::string_view kSpaces = " \t\r\n";
 constexpr int kDeepest = 8;
+constexpr std::size_t kLongestHead = 4096;
 constexpr std::size_t kQuoted = 32;  // more than a message shows
 constexpr double kMostNodes = 2147483647;
 constexpr std::int64_t kMostCounted = std::int64_t(1) << 50;
@@ -36,13 +38,26 @@ std::size_t skipProlog(InputFile& file, std::size_t at) {
         else if (text.starts_with("<!--"))
             end = "-->";
         else if (text.starts_with("<!"))
-            end = ">";
+            refuseDeclaration(file.path(), at);
         else
             return at;
         const std::size_t close = file.find(end, at);
         if (close == InputFile::npos) return file.size();
         at = close + end.size();
     }
+}
+
+/// The names in a file are read as UTF-8. Others could mean another file to the reader.
+bool isOtherEncoding(InputFile& file) {
+    std::string declaration = file.copy(0, kLongestHead);
+    declaration.resize(std::min(declaration.find("?>"), declaration.size()));
+    const auto declared =
+        declaration.find("<?xml") <= 3 ? attributeOf(declaration, "encoding") : std::nullopt;
+    if (!declared) return false;
+    std::string name(*declared);
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return char(std::tolower(c)); });
+    return name != "utf-8" && name != "us-ascii";
 }
 
 /// Adds without overflow: files may name each other many times.
@@ -82,6 +97,7 @@ class XmlCheck {
         double wholePoints = -1;
         double pointsOfPieces = 0;
         bool pieceHasValues = false;
+        bool isOtherEncoding = false;  ///< than UTF-8
     };
 
     std::size_t checkFrame(File& file) const;
@@ -222,7 +238,15 @@ void XmlCheck::checkName(File& file, const XmlTag& tag) const {
 void XmlCheck::checkNamedFile(File& file, const XmlTag& tag, std::string_view attribute) {
     const auto name = attributeOf(tag.text, attribute);
     if (!name || name->empty()) return;
-    const auto piece = std::filesystem::path(file.path).parent_path() / decodeEntities(*name);
+    // The reader would change them, or take them for absolute.
+    const std::string decoded = decodeEntities(*name);
+    const bool isOther = std::any_of(name->begin(), name->end(), [&](unsigned char c) {
+        return c < ' ' || (c > 0x7e && file.isOtherEncoding);
+    });
+    if (isOther || decoded.find(':') == 1)
+        throw InputError(file.path + ": byte " + std::to_string(tag.begin) + ": names a file " +
+                         quoted(*name) + ", which isn't a name that every system reads alike");
+    const auto piece = std::filesystem::path(file.path).parent_path() / decoded;
     if (folder_) checkInFolder(*folder_, file.path, piece.string());
     std::error_code error;
     if (!std::filesystem::exists(piece, error))
@@ -278,7 +302,8 @@ void XmlCheck::checkSums(const File& file) const {
 DeclaredSize XmlCheck::run(const std::string& path, int depth) {
     if (depth > kDeepest) throw InputError(path + ": files name each other more than 8 deep");
     InputFile input(path);
-    File file{input, path, depth, {}, {}, {}, 0, {}, {}, 0, 0, -1, 0, false};
+    File file{input, path, depth, {}, {}, {}, 0, {}, {}, 0, 0, -1, 0, false, false};
+    file.isOtherEncoding = isOtherEncoding(input);
     file.size.fileBytes = std::int64_t(input.size());
     const std::size_t inside = checkFrame(file);
     XmlTags tags(input, inside, file.markupEnd);

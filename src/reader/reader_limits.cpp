@@ -105,11 +105,7 @@ IsolationLimits limitsToLook() {
 
 IsolationLimits defaultLimits(const std::string& path, const ReadOptions& options) {
     const std::optional<std::string> folder = allowedFolder(path, options);
-    // A file that the user named lies where it wants to; one that a .pvd file names doesn't.
-    if (folder && !options.folder.empty()) {
-        checkInFolder(*folder, options.folder, path);
-        for (const std::string& part : options.otherParts) checkInFolder(*folder, options.folder, part);
-    }
+    checkParts(path, options);
     InputSize size = sizeOfInput(path, folder);
     for (const std::string& part : options.otherParts) {
         const InputSize more = sizeOfInput(part, folder);

@@ -20,7 +20,7 @@ NUMBER = re.compile(rb"-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 WORD = re.compile(rb"[^\s\"<>=;(){}]+|[\"<>=;(){}]")
 
 
-def parallel_text(kind, extent, pieces, extension):
+def parallel_text(kind, extent, pieces):
     whole = f' WholeExtent="{extent}"' if extent else ""
     points = {"PStructuredGrid": "<PPoints><PDataArray type='Float64' NumberOfComponents='3'/></PPoints>", "PUnstructuredGrid": "<PPoints><PDataArray type='Float64' NumberOfComponents='3'/></PPoints>",
               "PRectilinearGrid": "<PCoordinates>" + "<PDataArray type='Float64'/>" * 3 + "</PCoordinates>", "PImageData": ""}[kind].replace("'", '"')  # fmt: skip
@@ -42,7 +42,7 @@ def parallel_sets():
     for style in ("ascii", "raw-zlib"):
         pieces = {f"part_{i}.vtu": make(mutate_mesh.STYLES[style]).serialise() for i, make in enumerate((mutate_mesh.tets, mutate_mesh.mixed))}
         names = "\n".join(f'<Piece Source="{name}"/>' for name in pieces)
-        sets[f"pvtu-{style}"] = {"mesh.pvtu": parallel_text("PUnstructuredGrid", "", names, ".vtu"), **pieces}
+        sets[f"pvtu-{style}"] = {"mesh.pvtu": parallel_text("PUnstructuredGrid", "", names), **pieces}
     for kind in ("StructuredGrid", "RectilinearGrid", "ImageData"):
         pieces, names = {}, ""
         for i, extent in enumerate(("0 2 0 3 0 1", "2 4 0 3 0 1")):
@@ -51,7 +51,7 @@ def parallel_sets():
             name = f"part_{i}{file.extension}"
             pieces[name] = file.serialise()
             names += f'<Piece Extent="{extent}" Source="{name}"/>\n'
-        sets[kind] = {"mesh.p" + file.extension[1:]: parallel_text("P" + kind, "0 4 0 3 0 1", names, file.extension), **pieces}
+        sets[kind] = {"mesh.p" + file.extension[1:]: parallel_text("P" + kind, "0 4 0 3 0 1", names), **pieces}
     return sets
 
 
