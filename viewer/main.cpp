@@ -98,7 +98,8 @@ int view(int argc, char** argv) {
         if (component) json["component"] = *component;
         document.change(std::move(json), false);
     }
-    if (!input.empty() && !std::filesystem::exists(input))
+    std::error_code error;
+    if (!input.empty() && !std::filesystem::exists(input, error))
         throw InputError(input + ": there is no such file");
     ViewSession session(job, options);
     session.document() = std::move(document);

@@ -1,7 +1,13 @@
 #include "interrupt.h"
 
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/time.h>
+#include <time.h>
 #include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "base/sanitizers.h"
 #include "files/atomic_file.h"
@@ -35,6 +41,38 @@ void catchInterrupts(void (*handler)(int)) {
     if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
 }
 
+constexpr double kLongestTimer = 1e9;  // seconds
+constexpr double kLeftSeconds = 0.25;  // of processor time, for the last line
+
+/// Work of all threads goes on until the process ends, and the system may end it by force.
+void endOutOfTime(int) {
+    removeTemporaryFiles();
+    constexpr char kWipe[] = "\r\x1b[K";  // progress
+    constexpr char kLine[] =
+        "tessera: took more processor time than is allowed here (ulimit -t); no unfinished file is left\n";
+    [[maybe_unused]] ssize_t written = 0;
+    if (::isatty(STDERR_FILENO)) written = ::write(STDERR_FILENO, kWipe, sizeof kWipe - 1);
+    written = ::write(STDERR_FILENO, kLine, sizeof kLine - 1);
+    _exit(1);
+}
+
+/// Where both limits are the same, as the shell's ulimit sets them, the system gives no signal that could be
+/// caught: a timer rings before.
+void catchProcessorLimit() {
+    rlimit limit{};
+    if (::getrlimit(RLIMIT_CPU, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return;
+    signal(SIGXCPU, endOutOfTime);
+    signal(SIGPROF, endOutOfTime);
+    timespec used{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    const double left = std::max(
+        1e-3, double(limit.rlim_cur) - kLeftSeconds - double(used.tv_sec) - double(used.tv_nsec) * 1e-9);
+    itimerval timer{};
+    timer.it_value.tv_sec = time_t(std::min(left, kLongestTimer));
+    timer.it_value.tv_usec = suseconds_t((left - std::floor(left)) * 1e6);
+    ::setitimer(ITIMER_PROF, &timer, nullptr);
+}
+
 #if !defined(TESSERA_ADDRESS_SANITIZER) && !defined(TESSERA_THREAD_SANITIZER)
 void endAtOnce(int number) {
     constexpr char kLine[] = "tessera: interrupted; no unfinished file is left\n";
@@ -42,7 +80,8 @@ void endAtOnce(int number) {
     _exit(128 + number);
 }
 
-// Libraries take a tenth of a second to set themselves up before main(): nothing is begun by then.
+// Libraries take a tenth of a second to set themselves up before main(): nothing is begun by then. While the
+// system still loads them a signal just ends the program, without a line.
 void catchEarlyInterrupts() {
     catchInterrupts(endAtOnce);
 }
@@ -53,6 +92,7 @@ void catchEarlyInterrupts() {
 
 void installInterruptHandlers() {
     catchInterrupts(handleSignal);
+    catchProcessorLimit();
     // A file size limit and a closed pipe are reported by write(); the default action would kill the process
     // before it cleans up.
     signal(SIGXFSZ, SIG_IGN);

@@ -25,6 +25,7 @@ namespace {
 constexpr int kFirstSpare = 10;  // above every descriptor that the child gets
 constexpr int kFewestFiles = 32;
 constexpr double kEndMs = 2000;
+constexpr double kTickAccuracy = 0.8;  // of the kernel's count of processor time, on a busy machine
 
 /// The terminal signals the whole group: what becomes of the child is its parent's decision.
 sigset_t maskOfChild() {
@@ -118,11 +119,10 @@ bool ranIntoProcessorLimit(int status, const rusage& used) {
     rlimit limit{};
     if (!WIFSIGNALED(status) || ::getrlimit(RLIMIT_CPU, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
         return false;
-    // The kernel counts in ticks.
     const double seconds = double(used.ru_utime.tv_sec + used.ru_stime.tv_sec) +
                            double(used.ru_utime.tv_usec + used.ru_stime.tv_usec) * 1e-6;
     return WTERMSIG(status) == SIGXCPU ||
-           (WTERMSIG(status) == SIGKILL && seconds > double(limit.rlim_cur) - 0.1);
+           (WTERMSIG(status) == SIGKILL && seconds > kTickAccuracy * double(limit.rlim_cur));
 }
 
 ProcessEnd describe(int status, const rusage& used) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/check.h"
+#include "resample/check_lattice.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -31,8 +32,7 @@ SamplingGrid cubicGrid(const Box3d& boundsWorld, int pointsAlongLongest) {
 
 SamplingGrid cubicGridOfSpacing(const Box3d& boundsWorld, double spacingWorld) {
     checkBounds(boundsWorld);
-    if (!(spacingWorld > 0) || !std::isfinite(spacingWorld))
-        throw InputError("a lattice needs a spacing above 0");
+    checkSpacing(spacingWorld);
     SamplingGrid grid{Lattice::axisParallel(boundsWorld.min, spacingWorld), {}};
     for (int axis = 0; axis < 3; ++axis) {
         // The quotient's rounding must not cost the last point.

@@ -13,6 +13,7 @@
 #include "job/output_paths.h"
 #include "job/repair_report.h"
 #include "job/report_text.h"
+#include "job/wrap_text.h"
 #include "pictures/image.h"
 #include "pictures/image_exr.h"
 #include "resample/statistic_names.h"
@@ -191,7 +192,8 @@ void CutRun::writePngFile() {
                                      request_.input, result_.channelNames.front(), planeText(result_.cut)));
     result_.ranges.push_back(range);
     PictureOptions options;
-    options.title = result_.channelNames.front() + "  " + planeText(result_.cut);
+    options.title =
+        shortened(result_.channelNames.front(), kTitleNameColumns) + "  " + planeText(result_.cut);
     if (request_.range) {
         options.min = (*request_.range)[0];
         options.max = (*request_.range)[1];

@@ -11,6 +11,7 @@
 #include "job/output_paths.h"
 #include "job/repair_report.h"
 #include "job/vdb_contents.h"
+#include "job/wrap_text.h"
 #include "pictures/image.h"
 #include "pictures/sample_slice.h"
 #include "tessera/error.h"
@@ -125,7 +126,8 @@ DrawnSlice drawVdb(const DrawRequest& request, Job& job) {
             fmt::format("{}: the plane {} = {:.9g} meets no voxel with a finite value of {}: nothing to draw",
                         request.input, axis, drawn.positionWorld, field.name));
     PictureOptions options;
-    options.title = fmt::format("{}  {} = {:.4g}", field.name, axis, drawn.positionWorld);
+    options.title =
+        fmt::format("{}  {} = {:.4g}", shortened(field.name, kTitleNameColumns), axis, drawn.positionWorld);
     if (request.range) {
         options.min = (*request.range)[0];
         options.max = (*request.range)[1];

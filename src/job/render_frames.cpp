@@ -129,10 +129,12 @@ RenderedFrames renderFrames(const FramesRequest& request, Job& job) {
     if (!request.path.empty()) path = readCameraPath(request.path);
     const Scene scene = sceneOf(request.picture, job);
     const bool hasOwnRange = scene.function.range || !scene.function.stops.empty();
-    if (request.inputs.size() > 1 && !hasOwnRange)
-        job.warn("each file has colours by the range of its own values: transfer_function.range fixes them");
     try {
-        return drawFrames(request, scene, path, outputs, job);
+        RenderedFrames frames = drawFrames(request, scene, path, outputs, job);
+        if (request.inputs.size() > 1 && !hasOwnRange)
+            job.warn(
+                "each file has colours by the range of its own values: transfer_function.range fixes them");
+        return frames;
     } catch (const InputError& error) {
         throwNamed(error, request.picture, request.inputs);
     }

@@ -26,6 +26,8 @@ namespace {
 
 /// 16 bytes each, and up to 20 more while they are written.
 constexpr std::int64_t kMostPixels = 200'000'000;
+/// Shaders compute in single precision.
+constexpr double kShortestDrawn = 1e-30, kLongestDrawn = 1e30;
 
 }  // namespace
 
@@ -142,6 +144,16 @@ void describe(const PictureSource& source, const GlThread& thread, const Scene& 
 
 namespace {
 
+std::string whyEmpty(const Box3d& boundsWorld) {
+    const Vec3d size = boundsWorld.size();
+    const double longest = std::max({size.x, size.y, size.z});
+    if (longest >= kShortestDrawn && longest <= kLongestDrawn)
+        return "the camera, a clip or the transfer function leaves nothing to see";
+    return fmt::format(
+        "devices draw lengths between {:g} and {:g}, and the data is {:.6g} long: other units help",
+        kShortestDrawn, kLongestDrawn, longest);
+}
+
 RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job& job) {
     const bool isExr = chooseFormat(request.output, {}, {"png", "exr"}) == "exr";
     GlThread& thread = sharedGlThread(chooseGlPlatform(request.platform));
@@ -158,10 +170,8 @@ RenderedPicture drawScene(const RenderRequest& request, const Scene& scene, Job&
     RenderedPicture picture;
     const RgbaImage image = draw(asked.options, picture.counts);
     if (isEmpty(image))
-        throw InputError(
-            fmt::format("nothing of {} is in the picture: the camera, a clip or the transfer "
-                        "function leaves nothing to see",
-                        source->title()));
+        throw InputError(fmt::format("nothing of {} is in the picture: {}", source->title(),
+                                     whyEmpty(source->boundsWorld())));
     if (isExr)
         writeLight(request.output, image, job.execution);
     else

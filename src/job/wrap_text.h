@@ -12,6 +12,8 @@ std::size_t textWidth(const std::string& text);
 
 /// At most `width` columns, at least 5: a longer text loses its middle, "velocity_mag...phase_2".
 std::string shortened(const std::string& text, std::size_t width);
+/// What the name of a field may take of a picture's title.
+inline constexpr std::size_t kTitleNameColumns = 80;
 
 /// Breaks a line at spaces so that it fits. A word that is longer stays whole.
 /// @param indent of what continues it.

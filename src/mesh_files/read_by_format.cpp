@@ -52,7 +52,9 @@ bool looksLikeCgns(std::string_view bytes) {
 RawMesh readRaw(const std::string& path, const ReadOptions& options, const Execution& execution,
                 OpenVtkFormat openOther) {
     const std::string extension = extensionOf(path);
-    if (extension == ".foam" && std::filesystem::exists(path))  // a marker beside the case, mostly empty
+    std::error_code error;
+    if (extension == ".foam" &&
+        std::filesystem::exists(path, error))  // a marker beside the case, mostly empty
         return readVtk(path, VtkFormat::openfoam, options, execution, openOther);
     const std::string head = InputFile(path).copy(0, kHeadBytes);
     if (isOneOf(extension, {".node", ".ele"})) return readTetgen(path, options);

@@ -61,7 +61,8 @@ InputSize sizeOfInput(const std::string& path, const std::optional<std::string>&
     std::string extension = given.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return char(std::tolower(c)); });
-    if (extension == ".foam" && std::filesystem::exists(given))
+    std::error_code error;
+    if (extension == ".foam" && std::filesystem::exists(given, error))
         return {bytesOfFolder(given.parent_path()), 0};
     InputFile file(path);
     const std::string head = file.copy(0, kHeadBytes);

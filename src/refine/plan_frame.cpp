@@ -14,6 +14,7 @@
 #include "refine/node_set.h"
 #include "refine/refine_options.h"
 #include "refine/wishes.h"
+#include "resample/check_lattice.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -198,6 +199,7 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     if (criteria.isOnly(Criterion::uniform) || criteria.isOnly(Criterion::focus) ||
         hasFinestSpacing(options)) {
         const double finest = finestSpacing(options, longest);
+        checkSpacing(finest);
         const double far = farthestIndex(sampled, frame.originWorld, finest);
         if (!(far < kMaxIndex))
             throw InputError("a spacing of " + shortNumber(finest, 6) + " makes " + shortNumber(far, 6) +
@@ -214,9 +216,12 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     // A box to look at closely needn't hold many elements: refinement by error starts from few points there.
     if (options.boundsWorld && criteria.isOnly(Criterion::error) && options.maxLevels == 0)
         while (frame.rootSpacingWorld * options.brickCells < longest) frame.rootSpacingWorld *= 2;
+    checkSpacing(frame.rootSpacingWorld);
     const double far = std::max(1.0, farthestIndex(sampled, frame.originWorld, frame.rootSpacingWorld));
     int depth = 0;
-    while (depth + 1 < levels && std::ldexp(far, depth + 1) < kMaxIndex) ++depth;
+    while (depth + 1 < levels && std::ldexp(far, depth + 1) < kMaxIndex &&
+           isPossibleSpacing(std::ldexp(frame.rootSpacingWorld, -(depth + 1))))
+        ++depth;
     frame.maxDepth = Depth(depth);
     return frame;
 }

@@ -24,7 +24,7 @@ inline bool hasFinestSpacing(const RefineOptions& options) {
 
 /// The lattices for these options. With a finest spacing given, depth frame.maxDepth has it; else depth 0 has
 /// 64 points (32 for bricks of 8) along the longest axis, from the bounds' minimum to their maximum, and so
-/// has every finer one.
+/// has every finer one. Throws InputError for a spacing that sampling can't compute with.
 PlanFrame chooseFrame(const Box3d& meshBoundsWorld, const RefineOptions& options);
 
 /// The finest spacing, or that of 256 points where none is given: h_0 of focuses.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/text.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -13,12 +14,21 @@ constexpr int kIndexLimit = 1 << 30;
 
 }  // namespace
 
+void checkSpacing(double spacingWorld) {
+    if (isPossibleSpacing(spacingWorld)) return;
+    throw InputError("a spacing of " + shortNumber(spacingWorld, 6) + " is too " +
+                     (spacingWorld < 1 ? "small" : "large") + " for coordinates to be resolved: those from " +
+                     shortNumber(kLeastSpacing, 6) + " to " + shortNumber(kLargestSpacing, 6) +
+                     " can be computed with; give the mesh other units");
+}
+
 void checkLattice(const Lattice& lattice, std::span<const IndexBox> boxes) {
     const Vec3d* steps[3] = {&lattice.uWorld, &lattice.vWorld, &lattice.wWorld};
     for (int a = 0; a < 3; ++a) {
-        const double length = glm::length(*steps[a]);
+        const double length = std::hypot(steps[a]->x, steps[a]->y, steps[a]->z);
         if (!(length > 0) || !std::isfinite(length) || !std::isfinite(lattice.originWorld[a]))
             throw InputError("the lattice's origin must be finite and its spacing positive and finite");
+        checkSpacing(length);
     }
     const double volume = glm::dot(lattice.uWorld, glm::cross(lattice.vWorld, lattice.wWorld));
     const double cube =

@@ -6,6 +6,7 @@
 
 #include "base/text.h"
 #include "mesh/sub_mesh.h"
+#include "resample/check_lattice.h"
 #include "tessera/error.h"
 #include "tessera/lattice.h"
 
@@ -60,6 +61,7 @@ CutAxes cutAxes(const CutOptions& options) {
 CutFrame frameOver(const Box3d& extent, const CutAxes& axes, const Vec3d& origin, int resolution) {
     const Vec3d size = extent.size();
     const double pixel = std::max(size.x, size.y) / resolution;
+    checkSpacing(pixel);
     const auto count = [&](double length) {
         return std::clamp(int(std::ceil(length / pixel - kSnap)), 1, resolution);
     };
@@ -96,7 +98,9 @@ Cut planCut(const TetMesh& mesh, const PlaneQuery& query, const CutOptions& opti
     const CutAxes axes = cutAxes(options);
     const Box3d& bounds = query.boundsWorld();
     if (bounds.empty()) throw InputError("the mesh has no element to cut");
-    const double diagonal = glm::length(bounds.size());
+    const Vec3d boundsSize = bounds.size();
+    const double diagonal = std::hypot(boundsSize.x, boundsSize.y, boundsSize.z);
+    if (!std::isfinite(diagonal)) checkSpacing(diagonal);
     // Twice the bound: the lattice's own points lie off the plane by their rounding.
     const double padPixels = 2 * options.spillVoxels;
 

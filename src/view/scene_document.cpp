@@ -23,7 +23,11 @@ SceneDocument SceneDocument::read(const std::string& path) {
     const Scene scene = readScene(path);  // strictly, with the file's name in what it says
     Json json = Json::parse(readWholeFile(path));
     const Json::json_pointer mesh("/effects/outline/mesh");
-    if (json.contains(mesh)) json[mesh] = std::filesystem::absolute(scene.outline.mesh).string();
+    if (json.contains(mesh)) {
+        std::error_code error;
+        const std::filesystem::path whole = std::filesystem::absolute(scene.outline.mesh, error);
+        if (!error) json[mesh] = whole.string();
+    }
     SceneDocument document;
     document.restart(std::move(json));
     return document;

@@ -219,6 +219,62 @@ class BadInput(AppTest):
     def test_bounds_beside_the_mesh(self):
         self.resample_fails("", self.cube, "--bounds", "5,5,5,6,6,6")
 
+    def test_lengths_beyond_what_can_be_computed_with_are_refused(self):
+        for scale, words in ((3e-323, "spacing small"), (1e-310, "spacing small"), (1e-200, "spacing small"), (1e200, "spacing large"), (1.7e308, "spacing large")):
+            mesh = self.write("scaled.vtu", vtu_text([[scale * x for x in p] for p in CUBE_POINTS], fields={"f": range(8)}))
+            path = self.write("path.txt", f"{scale / 2} {scale / 2} {scale / 2}\n")
+            for options in ([], ["--refine", "uniform", "--resolution", "20"], ["--refine", "error", "--max-error", "1%"]):
+                self.resample_fails(words, mesh, *options)
+            self.reject(2, words, "slice", mesh, "-o", "cut.exr")
+            self.reject(2, words, "compare", mesh, "--resolution", "16", "--algorithms", "software", "--runs", "1")
+            self.reject(2, words, "focus-trace", mesh, "--path", path, "--radius", "1")
+            self.reject(2, words, "render", mesh, "-o", "picture.png")
+            self.succeed("info", mesh)
+
+    def test_lengths_that_devices_do_not_know_are_told(self):
+        mesh = self.write("scaled.vtu", vtu_text([[1e-60 * x for x in p] for p in CUBE_POINTS], fields={"f": range(8)}))
+        self.reject(2, "scaled.vtu 1e-60 long", "render", mesh, "-o", "picture.png")
+
+    def test_names_of_any_kind_are_one_line(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        outputs = {".vdb": ["resample", self.cube, "--quiet", "-o"], ".png": ["picture", "cube.vdb", "-o"], ".json": ["info", self.cube, "--json"],
+                   ".log": ["resample", self.cube, "-o", "out.vdb", "--quiet", "--resume"]}  # fmt: skip
+        for stem in ("n" * 300, "d/" * 2500 + "n", "no\nsuch\x1b[31m\x7f"):
+            for arguments in (
+                ["info", stem + ".vtu"], ["info", stem + ".pvd"], ["resample", stem + ".pvd", "-o", "out.vdb"], ["tets", stem + ".foam", "-o", "out.vtu"],
+                ["resample", self.cube, stem + ".vtu", "-o", "out_#.vdb"], ["resample", self.cube, "-o", "out.vdb", "--like", stem + ".vdb"],
+                ["verify", stem + ".pvd", "cube.vdb"], ["verify", self.cube, stem + ".vdb"], ["picture", "cube.vdb", "-o", "out.png", "--mesh", stem + ".case"],
+                ["render", "cube.vdb", "-o", "out.png", "--scene", stem + ".json"], ["focus-trace", self.cube, "--radius", "1", "--path", stem + ".txt"],
+                ["resample", self.cube, "-o", "out.vdb", "--refine", "focus,visibility", "--focus", "0,0,0", "--radius", "1",
+                 "--transfer-function", stem + ".json"],
+            ):  # fmt: skip
+                line = self.reject(2, "", *arguments)
+                self.assertLessEqual(len(line), 1000)
+                self.assertFalse(re.search("[\x00-\x1f\x7f]", line), line)
+            for ending, arguments in outputs.items() if len(stem) > 255 else ():
+                self.assertLessEqual(len(self.reject(1, "", *arguments, stem + ending)), 1000)
+
+    def test_a_long_name_of_a_field_is_written_and_verified(self):
+        name = "f" * 200_000
+        mesh = self.write("long.vtu", vtu_text(fields={name: range(8)}))
+        self.succeed("resample", mesh, "-o", "long.vdb", "--refine", "uniform", "--resolution", "9", "--quiet")
+        self.succeed("verify", mesh, "long.vdb")
+        self.succeed("picture", "long.vdb", "-o", "slice.png", "--mesh", mesh)
+        self.succeed("slice", mesh, "-o", "cut.png", "--resolution", "20")
+
+    def test_a_vdb_file_of_another_program_is_one_line(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        try:
+            import pyopenvdb
+        except ImportError:
+            self.skipTest("Python has no pyopenvdb")
+        grid = pyopenvdb.FloatGrid()
+        grid.fill((0, 0, 0), (5, 5, 5), 1.0)
+        pyopenvdb.write(str(self.folder / "other.vdb"), grids=[grid])
+        for arguments in (["info", "other.vdb"], ["verify", self.cube, "other.vdb"], ["picture", "other.vdb", "-o", "out.png"],
+                          ["render", "other.vdb", "-o", "out.png"], ["render", "other.vdb", "cube.vdb", "-o", "out_#.png"]):  # fmt: skip
+            self.reject(2, "other.vdb not written by Tessera", *arguments)
+
     def test_like_needs_a_vdb_file(self):
         self.resample_fails("nothing.vdb", self.cube, "--like", "nothing.vdb")
         self.resample_fails("cube.vtu", self.cube, "--like", self.cube)
@@ -506,6 +562,24 @@ class FailingOutputs(AppTest):
         self.reject(2, "", "resample", "nothing.vtu", "-o", "out.vdb")
         self.assertEqual((self.folder / "out.vdb").read_text(), "old")
 
+    def test_links_are_followed(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        (self.folder / "below").mkdir()
+        for ending, arguments in {".vdb": ["resample", self.cube, "--quiet", "-o"], ".vtu": ["tets", self.cube, "--quiet", "-o"],
+                                  ".png": ["picture", "cube.vdb", "--quiet", "-o"], ".json": ["info", self.cube, "--json"]}.items():  # fmt: skip
+            link, second, file = self.folder / ("link" + ending), self.folder / "below/link", self.folder / "below" / ("file" + ending)
+            for target in (second, pathlib.Path("below/link")):
+                link.symlink_to(target)
+                second.symlink_to(file.name)
+                self.succeed(*arguments, link.name)
+                self.assertTrue(link.is_symlink() and second.is_symlink() and file.is_file() and not file.is_symlink())
+                self.assertEqual(sorted(os.listdir(self.folder / "below")), sorted([file.name, "link"]))
+                link.unlink(), second.unlink(), file.unlink()
+            link.symlink_to(second)
+            second.symlink_to(link)
+            self.reject(1, f"{link.name} links", *arguments, link.name)
+            link.unlink(), second.unlink()
+
     def test_standard_output_that_takes_nothing(self):
         self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
         for command in (
@@ -562,6 +636,25 @@ class Interruption(AppTest):
         self.assertEqual(process.returncode, code, errors)
         self.assertEqual(len(errors.splitlines()), 1, errors)
         self.assertEqual(os.listdir(self.folder), ["cube.vtu"])
+
+    def test_a_signal_before_main_is_one_line(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            for _ in range(3):
+                process = subprocess.Popen([TESSERA, "info", self.stokes], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                self.addCleanup(process.kill)
+                while process.poll() is None and not catches(process.pid, number):
+                    pass  # until the libraries are loaded it has no handler
+                process.send_signal(number)
+                self.finish(process, 128 + number)
+
+    def test_a_program_that_outlives_its_terminal(self):
+        process = subprocess.Popen([TESSERA, "info", self.stokes], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))  # fmt: skip
+        while process.poll() is None:
+            process.send_signal(signal.SIGHUP)
+            time.sleep(0.005)
+        _, errors = process.communicate(timeout=60)
+        self.assertEqual((process.returncode, errors), (0, b""))
 
     def test_interrupt_while_sampling(self):
         for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
@@ -1969,6 +2062,19 @@ class Reader(AppTest):
         report = self.report("resample", "grid.vtk", "-o", "out.vdb", "--max-memory", "600M")
         self.assertLess(report["peak_memory_bytes"], 600 << 20)
 
+    def test_processor_time_is_named(self):
+        n = 180
+        head = f"# vtk DataFile Version 3.0\ngrid\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS {n} {n} {n}\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+        self.write("grid.vtk", (head + f"POINT_DATA {n**3}\nSCALARS f unsigned_char 1\nLOOKUP_TABLE default\n").encode() + bytes(n**3))
+        for most in (1, 100):  # the program is ended by force, or by a signal
+
+            def limit():
+                resource.setrlimit(resource.RLIMIT_CPU, (1, most))
+
+            self.reject(1, "grid.vtk (ulimit -t)", "info", "grid.vtk", preexec_fn=limit)
+            self.reject(1, "(ulimit -t) no unfinished file", "resample", self.cube, "-o", "out.vdb", "--quiet", "--refine", "uniform", "--resolution", "1500",
+                        "--max-voxels", "10G", preexec_fn=limit)  # fmt: skip
+
     def test_bad_options(self):
         for value in ("0", "-1", "nan", "inf", "soon"):
             self.reject(2, "--max-read-time", "info", self.cube, f"--max-read-time={value}")
@@ -1998,6 +2104,12 @@ class Reader(AppTest):
                 self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
                 self.assertRegex(result.stderr, "open files.*ulimit -n")
         self.assertEqual(codes, {0, 1})
+
+    def test_few_open_files_are_one_line_for_every_command(self):
+        self.succeed("resample", self.cube, "-o", "cube.vdb", "--refine", "uniform", "--resolution", "9")
+        for files, arguments in ((4, ["info", "cube.vdb"]), (5, ["resample", self.cube, "-o", "out.vdb"]), (6, ["verify", self.cube, "cube.vdb"]),
+                                 (9, ["render", "cube.vdb", "-o", "out.png"]), (8, ["render", self.cube, "-o", "out.png"])):  # fmt: skip
+            self.reject(1, "open files (ulimit -n)", *arguments, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (files, files)))
 
     def test_reads_without_proc(self):
         hide = ["unshare", "--mount", "sh", "-c", 'mount -t tmpfs none /proc && exec "$@"', "sh"]
