@@ -8,6 +8,7 @@ import re
 import struct
 import subprocess
 import tempfile
+import zlib
 
 import mutate_mesh
 
@@ -213,8 +214,11 @@ def damage(data, rng):
 def damage_packed(name, data, rng):
     """What is packed by gzip is damaged within as often as without."""
     if name.endswith(".gz") and rng.random() < 0.5:
-        data, how = damage(gzip.decompress(data), rng)
-        return gzip.compress(data, mtime=0), how + " within"
+        try:
+            data, how = damage(gzip.decompress(data), rng)
+            return gzip.compress(data, mtime=0), how + " within"
+        except (OSError, EOFError, zlib.error):
+            pass  # it was damaged before
     return damage(data, rng)
 
 
