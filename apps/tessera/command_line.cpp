@@ -223,8 +223,10 @@ void addRefineOptions(CLI::App& command, ResampleArguments& a) {
     command
         .add_option(
             "--max-memory", a.common.reader.maxMemory,
-            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G; with "
-            "--reader in-process reading itself has no bound")
+            "bound on the memory for reading, the mesh, its samples and the work on them, e.g. 4G (default: "
+            "three quarters of the machine's or the container's); with --reader in-process reading itself "
+            "has "
+            "no bound")
         ->group(group);
     command
         .add_flag("--dry-run", a.request.dryRun,

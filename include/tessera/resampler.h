@@ -44,6 +44,20 @@ struct BindOptions {
     Route route = Route::automatic;
     /// Of the mesh that is bound, to share it with others; null: one of its own, built when it pays.
     std::shared_ptr<const SharedElementIndex> index = nullptr;
+    /// Bound on WorkMemory, bytes, without its fixed part; less than its least counts as that. 0: its most.
+    /// Samples don't depend on it.
+    std::int64_t workBytes = 0;
+};
+
+/// What a resampler takes of this machine's memory while it samples, beside the mesh, what is found out about
+/// its elements, and the samples; bytes.
+struct WorkMemory {
+    std::int64_t fixed = 0;  ///< what a driver takes, an emulated device's among them
+    std::int64_t least = 0;  ///< with this it works
+    std::int64_t most = 0;   ///< more doesn't speed it up
+    /// What a byte of samples comes to: between samples lies memory that the work has given back, but that
+    /// isn't used again.
+    double spread = 1;
 };
 
 /// Receives each finished block once: called concurrently from worker threads, in any order; the block lives
@@ -112,6 +126,8 @@ class Resampler {
     /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow. Asked
     /// only when unavailableReason() is empty.
     virtual double relativeCost() const { return 1; }
+    /// The same on every machine.
+    virtual WorkMemory workMemory(int channels) const;
     /// @param fields indices into mesh.fields; channels of the blocks are their components, in this order.
     /// Throws InputError for options that it doesn't have.
     virtual std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,

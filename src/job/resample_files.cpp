@@ -177,7 +177,7 @@ void ResampleRun::surveySeries(const std::vector<ResampleStep>& steps) {
 /// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing
 /// shows well.
 void ResampleRun::surveySpacing(const TetMesh& mesh) {
-    const StepPlan plan = planStep(mesh, request_);
+    const StepPlan plan = planStep(mesh, request_, choice_.resampler());
     const FieldSelection& selection = plan.selection;
     const BrickTree tree =
         plan.refine.criterion.has(Criterion::error) || plan.refine.criterion.has(Criterion::visibility)
@@ -196,7 +196,7 @@ Json ResampleRun::runStep(const ResampleStep& step) {
     Timer timer;
     const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
-    const StepPlan plan = planStep(file.mesh, request_);
+    const StepPlan plan = planStep(file.mesh, request_, choice_.resampler());
     checkOutputFields(plan.selection.outputs, request_.shape.hasSurface());
     sayImport(step, file, plan);
     const auto resample = [&](const Resampler& resampler) {

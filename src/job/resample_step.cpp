@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
+#include "base/machine_memory.h"
 #include "base/timer.h"
 #include "cache/brick_log.h"
 #include "job/memory_plan.h"
@@ -119,14 +121,19 @@ void judgeFile(const TetMesh& mesh, const StepPlan& plan, BrickResult& bricks) {
 
 }  // namespace
 
-StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request) {
+StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request, const Resampler& resampler) {
     StepPlan plan{selectFields(mesh, request.fields), {}, request.refine, request.shape};
     plan.namesText = nameFields(plan.selection.outputs, request.fields, request.program);
+    const MemoryShares shares =
+        shareMemory(request.refine.maxMemoryBytes, mesh, plan.shape.layout == VdbLayout::flat,
+                    resampler.workMemory(plan.selection.channels));
+    plan.refine.bind.workBytes = shares.workBytes;
     if (request.refine.maxMemoryBytes > 0) {
-        const SampleBudget budget = sampleBudget(request.refine.maxMemoryBytes, mesh, plan.selection.channels,
-                                                 plan.shape.layout == VdbLayout::flat);
-        plan.refine.maxMemoryBytes = budget.levelsBytes;
-        plan.shape.maxFlatBytes = budget.flatBytes;
+        plan.refine.maxMemoryBytes = shares.levelsBytes;
+        plan.shape.maxFlatBytes = shares.flatBytes;
+    } else {
+        plan.refine.defaultMemoryBytes = shares.levelsBytes;
+        plan.shape.maxFlatBytes = std::min(shares.flatBytes, machineMemoryBytes() / 4);
     }
     for (const std::string& name : request.errorFields)
         plan.refine.errorFields.push_back(findField(mesh, plan.selection.fields, name));

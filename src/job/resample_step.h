@@ -25,7 +25,7 @@ struct StepPlan {
     OutputShape shape;
 };
 /// Throws InputError when the mesh lacks a field, or the memory for samples is too small.
-StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request);
+StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request, const Resampler& resampler);
 
 /// What became of a step.
 struct StepResult {

@@ -19,6 +19,9 @@ namespace {
 constexpr int kPadding = kSmallExtent + 2;
 /// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
 constexpr const char* kDepthScale = "1.220703125e-4";
+/// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
+/// corners.
+constexpr std::size_t kVerticesAtOnce = std::size_t(3) << 14;
 constexpr GLenum kFragmentInvocations = 0x82F4;  // GL_ARB_pipeline_statistics_query
 
 int levelsOf(SampleFormat format) {
@@ -177,8 +180,27 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
     isReady_ = hasGeometry;
 }
 
+/// At most two parts are under way on an emulated device.
+void RasterDevice::drawInParts(GlContext& context, GLenum mode, std::size_t count) {
+    const GlFunctions& gl = context.functions();
+    const bool isEmulated = thread_.info().isSoftware;
+    const std::size_t most = isEmulated ? kVerticesAtOnce : count;
+    for (std::size_t first = 0; first < count; first += most) {
+        const auto ofPart = GLsizei(std::min(most, count - first));
+        if (mode == GL_POINTS)
+            gl.DrawArrays(mode, GLint(first), ofPart);
+        else
+            gl.DrawElements(mode, ofPart, GL_UNSIGNED_INT,
+                            reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+        if (!isEmulated) continue;
+        GlFence part(context);
+        if (lastPart_) lastPart_.wait();
+        lastPart_ = std::move(part);
+    }
+}
+
 void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
-                                  const std::function<void()>& draw) {
+                                  GLenum mode, std::size_t count) {
     const GlFunctions& gl = context.functions();
     const GlProgram& used = program(context, variant);
     gl.UseProgram(used.id());
@@ -194,10 +216,7 @@ void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, co
     gl.Enable(GL_PROGRAM_POINT_SIZE);
     gl.ProvokingVertex(GL_FIRST_VERTEX_CONVENTION);
     gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target_.framebuffer.id());
-    if (isLayered_) {
-        draw();
-        return;
-    }
+    if (isLayered_) return drawInParts(context, mode, count);
     const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
     for (int layer = 0; layer < size_.z; ++layer) {
         target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT0, target_.codes, layer);
@@ -205,7 +224,7 @@ void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, co
         if (target_.coverage) target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT1, target_.coverage, layer);
         gl.NamedFramebufferDrawBuffers(target_.framebuffer.id(), target_.coverage ? 2 : 1, buffers);
         gl.ProgramUniform1i(used.id(), used.uniform("onlyLayer"), layer);
-        draw();
+        drawInParts(context, mode, count);
     }
 }
 
@@ -226,8 +245,7 @@ void RasterDevice::drawList(GlContext& context, const PrimitiveList& list, bool 
         }
         const GLuint buffer = upload(context, vertices_, list.sprites);
         gl.VertexArrayVertexBuffer(spriteArray_.id(), 0, buffer, 0, sizeof(Sprite));
-        drawPrimitives(context, variant, spriteArray_,
-                       [&] { gl.DrawArrays(GL_POINTS, 0, GLsizei(list.sprites.size())); });
+        drawPrimitives(context, variant, spriteArray_, GL_POINTS, list.sprites.size());
         counts_.vertices += std::int64_t(list.sprites.size());
         release(context, vertices_);
     }
@@ -246,9 +264,7 @@ void RasterDevice::drawList(GlContext& context, const PrimitiveList& list, bool 
         const GLuint buffer = upload(context, vertices_, list.vertices);
         gl.VertexArrayVertexBuffer(polygonArray_.id(), 0, buffer, 0, sizeof(PolygonVertex));
         gl.VertexArrayElementBuffer(polygonArray_.id(), upload(context, indices_, list.indices));
-        drawPrimitives(context, variant, polygonArray_, [&] {
-            gl.DrawElements(GL_TRIANGLES, GLsizei(list.indices.size()), GL_UNSIGNED_INT, nullptr);
-        });
+        drawPrimitives(context, variant, polygonArray_, GL_TRIANGLES, list.indices.size());
         counts_.vertices += std::int64_t(list.vertices.size());
         release(context, vertices_);
         release(context, indices_);
@@ -298,10 +314,9 @@ void RasterDevice::drawPublished(GlContext& context, const PublishedList& list) 
                                    sizeof(GouraudCorner));
     }
     gl.VertexArrayElementBuffer(array.id(), upload(context, indices_, list.indices));
-    drawPrimitives(
-        context, {isSilhouette ? Stage::silhouettes : Stage::gouraud, false, channels_, levelsOf(format_)},
-        array,
-        [&] { gl.DrawElements(GL_TRIANGLES, GLsizei(list.indices.size()), GL_UNSIGNED_INT, nullptr); });
+    drawPrimitives(context,
+                   {isSilhouette ? Stage::silhouettes : Stage::gouraud, false, channels_, levelsOf(format_)},
+                   array, GL_TRIANGLES, list.indices.size());
     counts_.vertices += std::int64_t(list.silhouettes.size() + list.polygons.size());
     release(context, vertices_);
     release(context, indices_);
@@ -342,8 +357,8 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
     }
     gl.VertexArrayVertexBuffer(pointArray_.id(), 0, upload(context, vertices_, points), 0,
                                sizeof(DecidedPoint));
-    drawPrimitives(context, {Stage::points, false, channels_, levelsOf(format_)}, pointArray_,
-                   [&] { gl.DrawArrays(GL_POINTS, 0, GLsizei(points.size())); });
+    drawPrimitives(context, {Stage::points, false, channels_, levelsOf(format_)}, pointArray_, GL_POINTS,
+                   points.size());
     counts_.vertices += std::int64_t(points.size());
     release(context, vertices_);
 }

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -95,8 +94,10 @@ class RasterDevice {
     void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
     void drawPublished(GlContext& context, const PublishedList& list);
     void makeAlphaTexture(GlContext& context);
-    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
-                        const std::function<void()>& draw);
+    /// @param mode GL_POINTS, or GL_TRIANGLES by indices. @param count of vertices or indices.
+    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array, GLenum mode,
+                        std::size_t count);
+    void drawInParts(GlContext& context, GLenum mode, std::size_t count);
     /// Waits until the device has read what stood there.
     GLuint upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count);
     template <class T>
@@ -109,6 +110,7 @@ class RasterDevice {
     GlThread& thread_;
     bool isLayered_;
     bool countsFragments_;
+    GlFence lastPart_;  ///< of a device that is emulated
     std::map<Variant, GlProgram> programs_;
     Target target_;
     Stream easyGeometry_{kOfRegions}, easyChannels_{kOfRegions}, thinGeometry_{kOfRegions},

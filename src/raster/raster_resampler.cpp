@@ -14,6 +14,7 @@
 #include "gl/gl_platform.h"
 #include "index_space/element_bins.h"
 #include "raster/hard_elements.h"
+#include "raster/raster_budget.h"
 #include "raster/raster_device.h"
 #include "raster/regions.h"
 #include "resample/bound_mesh.h"
@@ -25,8 +26,6 @@ namespace tessera {
 
 namespace {
 
-/// What a region may take on the device.
-constexpr std::int64_t kTargetBytes = std::int64_t(160) << 20;
 /// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
 constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
 
@@ -40,7 +39,7 @@ struct OpenBlock {
 struct RegionJob {
     const RasterRegion* region = nullptr;
     PreparedRegion prepared;  ///< kept until the device is done
-    /// Kept for the passes after the first, when there are any.
+    /// Kept for the passes after the first, when there is room for all of them.
     std::vector<std::shared_ptr<const SliceBatch>> batches;
     std::vector<std::future<void>> draws;
     std::vector<std::future<RasterImage>> images;
@@ -53,6 +52,7 @@ class BoundRaster : public BoundResampler {
         : mesh_(mesh, fields, routed(options, isPublished)),
           format_(options.format),
           isPublished_(isPublished),
+          workBytes_(options.workBytes),
           platform_(platform),
           target_(nameOf(platform)),
           generator_(std::move(generator)) {
@@ -102,17 +102,21 @@ class BoundRaster : public BoundResampler {
               boxes_(boxes),
               sink_(sink),
               execution_(execution),
-              slots_(slots) {}
+              slots_(slots),
+              budget_(shareOut(bound.workBytes_, int(bound.channels_.size()))),
+              room_(budget_.queueBytes) {}
 
         ResampleStatistics all();
 
       private:
         void plan();
+        void binRegions();
         void start(std::size_t region);
         void generate(RegionJob& job, std::size_t pass);
+        void emit(RegionJob& job, std::size_t pass);
+        void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch, std::shared_ptr<const void> room);
         /// Copies a rendered region into the slots.
         void keep(GlContext& context, const RasterRegion& region, std::size_t pass);
-        void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch);
         void finishOldest();
         void copyPart(const RasterRegion& region, const RasterRegion::Part& part,
                       const std::vector<RasterImage>& images);
@@ -132,6 +136,8 @@ class BoundRaster : public BoundResampler {
         const BlockSink& sink_;
         const Execution& execution_;
         const TextureSlots* slots_;  ///< where samples stay on the device; the sink then gets nothing
+        RasterBudget budget_;
+        QueueRoom room_;
 
         std::optional<TetMesh> part_;          ///< what is near the boxes, where that is little
         std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
@@ -164,6 +170,7 @@ class BoundRaster : public BoundResampler {
     BoundMesh mesh_;
     SampleFormat format_;
     bool isPublished_;
+    std::int64_t workBytes_;
     GlPlatform platform_;
     std::string target_;
     std::shared_ptr<const SliceGenerator> generator_;
@@ -216,22 +223,33 @@ ResampleStatistics BoundRaster::Run::all() {
 }
 
 void BoundRaster::Run::plan() {
-    const std::int64_t channels = std::min<std::int64_t>(4, std::int64_t(bound_.channels_.size()));
-    const std::int64_t bytesAPoint = channels > 1 ? 20 : 8;
-    regions_ = planRasterRegions(boxes_, kTargetBytes / bytesAPoint);
-    blocks_.resize(boxes_.size());
-    partCounts_.assign(boxes_.size(), 0);
-    std::vector<IndexBox> regionBoxes;
-    for (const RasterRegion& region : regions_) {
-        regionBoxes.push_back(region.points);
-        for (const RasterRegion::Part& part : region.parts) ++partCounts_[part.box];
-    }
+    regions_ = planRasterRegions(boxes_, budget_.regionPoints);
     frame_ = frameNodes(mesh(), lattice_, execution_);
     axes_ = SliceAxes::along(slots_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
-    bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
+    binRegions();
+    blocks_.resize(boxes_.size());
+    partCounts_.assign(boxes_.size(), 0);
+    for (const RasterRegion& region : regions_)
+        for (const RasterRegion::Part& part : region.parts) ++partCounts_[part.box];
     statistics_.add(counted::elementsNear, mesh().elementCount());
     statistics_.add(counted::coveredPoints, 0);
     statistics_.add(counted::elementBlockPairs, std::int64_t(bins_.elements.size()));
+}
+
+/// Regions that more elements reach than there is memory for are cut.
+void BoundRaster::Run::binRegions() {
+    for (;;) {
+        std::vector<IndexBox> regionBoxes;
+        for (const RasterRegion& region : regions_) regionBoxes.push_back(region.points);
+        bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
+        std::vector<RasterRegion> cut;
+        for (std::size_t r = 0; r < regions_.size(); ++r)
+            cutRegion(std::move(regions_[r]),
+                      1 + (std::int64_t(bins_.of(r).size()) - 1) / budget_.regionElements, cut);
+        const bool isDone = cut.size() == regions_.size();
+        regions_ = std::move(cut);
+        if (isDone) return;
+    }
 }
 
 void BoundRaster::Run::start(std::size_t region) {
@@ -268,55 +286,66 @@ void BoundRaster::Run::keep(GlContext& context, const RasterRegion& region, std:
     device_.finishRegion(context);
 }
 
-void BoundRaster::Run::post(RegionJob& job, std::shared_ptr<const SliceBatch> batch) {
-    job.draws.push_back(device_.thread().post(
-        [this, batch = std::move(batch)](GlContext& context) { device_.draw(context, *batch); }));
+void BoundRaster::Run::post(RegionJob& job, std::shared_ptr<const SliceBatch> batch,
+                            std::shared_ptr<const void> room) {
+    job.draws.push_back(device_.thread().post([this, batch = std::move(batch), room = std::move(room)](
+                                                  GlContext& context) { device_.draw(context, *batch); }));
+}
+
+void BoundRaster::Run::emit(RegionJob& job, std::size_t pass) {
+    constexpr int kLayersASlab = 8;
+    const RasterInputs inputs = this->inputs();
+    const PreparedRegion& prepared = job.prepared;
+    const int layers = prepared.points.size()[axes_.l];
+    const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
+    std::vector<SlabInput> slabs;
+    std::int64_t bytes = 0;
+    for (std::size_t s = 0; s < active.slabCount(); ++s) {
+        if (active.of(s).empty()) continue;
+        SlabInput& slab = slabs.emplace_back();
+        slab.axes = axes_;
+        slab.size = prepared.points.size();
+        slab.layerBegin = int(s) * kLayersASlab;
+        slab.layerEnd = std::min(slab.layerBegin + kLayersASlab, layers);
+        slab.elements = prepared.elements;
+        slab.active = active.of(s);
+        if (bound_.isPublished_) {
+            slab.published = prepared.published;
+            slab.nodeCodes = prepared.nodeCodes[pass];
+            slab.channels = inputs.recordedChannels(pass);
+        }
+        bytes += primitiveBytes(slab);
+    }
+    // Primitives know nothing of channels, but those of the published methods hold values.
+    const bool areKept = inputs.passCount() > 1 && !bound_.isPublished_ && bytes <= budget_.queueBytes;
+    parallelFor(execution_, std::int64_t(slabs.size()), [&](std::int64_t i) {
+        const SlabInput& slab = slabs[std::size_t(i)];
+        std::shared_ptr<const void> room = room_.take(primitiveBytes(slab));
+        auto batch = std::make_shared<SliceBatch>();
+        if (bound_.isPublished_)
+            bound_.generator_->emitPublished(slab, *batch);
+        else
+            bound_.generator_->emit(slab, *batch);
+        const std::lock_guard guard(mutex_);
+        if (pass == 0) {
+            statistics_.add(counted::elementSlicePairs, batch->pairs);
+            statistics_.add(counted::polygons, batch->polygons);
+        }
+        if (areKept) job.batches.push_back(batch);
+        post(job, std::move(batch), std::move(room));
+    });
 }
 
 void BoundRaster::Run::generate(RegionJob& job, std::size_t pass) {
     const Timer timer;
     const RasterInputs inputs = this->inputs();
-    const PreparedRegion& prepared = job.prepared;
-    // Primitives know nothing of channels, but those of the published methods hold values.
-    if (pass > 0 && !bound_.isPublished_) {
-        for (const auto& batch : job.batches) post(job, batch);
-    } else {
-        const Vec3i size = prepared.points.size();
-        const int layers = size[axes_.l];
-        constexpr int kLayersASlab = 8;
-        const ActiveElements active = listActiveElements(prepared, axes_, kLayersASlab);
-        parallelFor(execution_, std::int64_t(active.slabCount()), [&](std::int64_t i) {
-            const auto slab = std::size_t(i);
-            if (active.of(slab).empty()) return;
-            auto batch = std::make_shared<SliceBatch>();
-            const int first = int(i) * kLayersASlab;
-            SlabInput input{};
-            input.axes = axes_;
-            input.size = size;
-            input.layerBegin = first;
-            input.layerEnd = std::min(first + kLayersASlab, layers);
-            input.elements = prepared.elements;
-            input.active = active.of(slab);
-            if (bound_.isPublished_) {
-                input.published = prepared.published;
-                input.nodeCodes = prepared.nodeCodes[pass];
-                input.channels = inputs.recordedChannels(pass);
-                bound_.generator_->emitPublished(input, *batch);
-            } else {
-                bound_.generator_->emit(input, *batch);
-            }
-            const std::lock_guard guard(mutex_);
-            if (pass == 0) {
-                statistics_.add(counted::elementSlicePairs, batch->pairs);
-                statistics_.add(counted::polygons, batch->polygons);
-            }
-            if (inputs.passCount() > 1) job.batches.push_back(batch);
-            post(job, std::move(batch));
-        });
-    }
-    if (!prepared.hard.empty()) {
+    if (job.batches.empty())
+        emit(job, pass);
+    else
+        for (const auto& batch : job.batches) post(job, batch, nullptr);
+    if (!job.prepared.hard.empty()) {
         auto points = std::make_shared<std::vector<DecidedPoint>>(
-            decideHardElements(inputs, prepared, pass, execution_));
+            decideHardElements(inputs, job.prepared, pass, execution_));
         job.draws.push_back(
             device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
     }
@@ -455,6 +484,10 @@ std::string RasterResampler::unavailableReason() const {
 
 double RasterResampler::relativeCost() const {
     return cost_ * (glDeviceInfo(chooseGlPlatform()).isSoftware ? kEmulatedCost : kDeviceCost);
+}
+
+WorkMemory RasterResampler::workMemory(int channels) const {
+    return rasterWorkMemory(channels);
 }
 
 std::vector<std::string> RasterResampler::targets() const {

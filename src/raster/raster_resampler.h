@@ -20,6 +20,7 @@ class RasterResampler : public Resampler {
     std::string unavailableReason() const override;
     std::vector<std::string> targets() const override;
     double relativeCost() const override;
+    WorkMemory workMemory(int channels) const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
 

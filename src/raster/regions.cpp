@@ -83,4 +83,24 @@ std::vector<RasterRegion> planRasterRegions(std::span<const IndexBox> boxes, std
     return regions;
 }
 
+void cutRegion(RasterRegion region, std::int64_t pieces, std::vector<RasterRegion>& regions) {
+    const Vec3i size = region.points.size();
+    const int longest = std::max({size.x, size.y, size.z});
+    if (pieces <= 1 || longest < 2 * kShortestEdge) {
+        regions.push_back(std::move(region));
+        return;
+    }
+    const int axis = size.z == longest ? 2 : size.y == longest ? 1 : 0;
+    IndexBox halves[2] = {region.points, region.points};
+    halves[0].max[axis] = halves[1].min[axis] = region.points.min[axis] + longest / 2;
+    for (const IndexBox& half : halves) {
+        RasterRegion part{half, {}};
+        for (const RasterRegion::Part& wanted : region.parts) {
+            const IndexBox common = intersect(wanted.points, half);
+            if (!common.empty()) part.parts.push_back({wanted.box, common});
+        }
+        if (!part.parts.empty()) cutRegion(std::move(part), (pieces + 1) / 2, regions);
+    }
+}
+
 }  // namespace tessera

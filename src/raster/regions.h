@@ -30,4 +30,11 @@ Vec3i cellOrigin(const IndexBox& region);
 /// box; the plan depends on the boxes only.
 std::vector<RasterRegion> planRasterRegions(std::span<const IndexBox> boxes, std::int64_t maxPoints);
 
+/// Edges of regions that cutRegion() makes are no shorter.
+inline constexpr int kShortestEdge = 16;
+
+/// Halves a region, and the halves, across their longest edges: into so many, or fewer where edges would be
+/// too short. Appends them.
+void cutRegion(RasterRegion region, std::int64_t pieces, std::vector<RasterRegion>& regions);
+
 }  // namespace tessera

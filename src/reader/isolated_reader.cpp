@@ -15,6 +15,7 @@
 #include <new>
 #include <optional>
 
+#include "base/machine_memory.h"
 #include "base/timer.h"
 #include "mesh_files/raw_mesh.h"
 #include "reader/mesh_packet.h"
@@ -47,7 +48,7 @@ class IsolatedReading {
                     const Execution& execution)
         : request_(std::move(request)), name_(std::move(name)), given_(given), execution_(execution) {
         request_.parent = ::getpid();
-        request_.memoryBytes = given.memoryBytes;
+        request_.memoryBytes = given.memoryBytes > 0 ? readingShare(given.memoryBytes) : 0;
         request_.threads = execution.threads;
         HeadWriter words;
         words.put(requestWords(request_));
@@ -178,7 +179,7 @@ void IsolatedReading::takeLimits(const ReaderProcess& process) {
     if (!(usual.memoryBytes > 0 && usual.seconds > 0 && usual.processorSeconds > 0))
         failWithGarbage("its limits make no sense");
     setLimits(usual);
-    limits_.memoryBytes = std::min(limits_.memoryBytes, std::max(given_.memoryBytes, mostMemoryBytes()));
+    limits_.memoryBytes = std::min(limits_.memoryBytes, std::max(given_.memoryBytes, defaultMemoryBytes()));
     if (given_.processorSeconds <= 0) limits_.processorSeconds += process.processorSeconds();
     report_.clear();
 }
@@ -233,6 +234,7 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
 
 /// The answer, or the error, of a report that is whole.
 void IsolatedReading::takeAnswer(ReaderProcess& process, const Take& take) {
+    process.end();  // before what it handed over is copied
     const ReportStart answer = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
     try {

@@ -1,13 +1,11 @@
 #include "reader/reader_limits.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <limits>
 #include <optional>
 
+#include "base/machine_memory.h"
 #include "files/input_file.h"
 #include "files/named_file.h"
 #include "mesh_files/ensight_check.h"
@@ -25,6 +23,8 @@ constexpr double kFloorBytes = 640.0 * (1 << 20), kBytesPerFileByte = 96, kBytes
 // OpenVDB needs a dozen bytes for a byte of file, and 40 where all values are the same.
 constexpr double kVdbFloorBytes = 192.0 * (1 << 20);
 constexpr double kFloorSeconds = 3, kSecondsPerFileByte = 0.25e-6, kSecondsPerItem = 20e-6;
+// The program that reads, before there is a mesh.
+constexpr std::int64_t kReaderBytes = std::int64_t(24) << 20;
 // Others may have the processors, and disks may be slow.
 constexpr double kFloorWaitSeconds = 60, kWaitShare = 10;
 constexpr double kLookSeconds = 20;
@@ -85,7 +85,7 @@ IsolationLimits limitsFor(const InputSize& size, double floorBytes) {
     IsolationLimits limits;
     limits.memoryBytes = std::int64_t(
         std::min(floorBytes + std::max(kBytesPerFileByte * size.bytes, kBytesPerItem * size.items),
-                 double(mostMemoryBytes())));
+                 double(readingShare(defaultMemoryBytes()))));
     limits.processorSeconds =
         kFloorSeconds + std::max(kSecondsPerFileByte * size.bytes, kSecondsPerItem * size.items);
     limits.seconds = std::max(kFloorWaitSeconds, kWaitShare * limits.processorSeconds);
@@ -94,10 +94,8 @@ IsolationLimits limitsFor(const InputSize& size, double floorBytes) {
 
 }  // namespace
 
-std::int64_t mostMemoryBytes() {
-    const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGE_SIZE);
-    if (pages <= 0 || pageBytes <= 0) return std::numeric_limits<std::int64_t>::max();
-    return std::int64_t(pages) * pageBytes / 4 * 3;
+std::int64_t readingShare(std::int64_t memoryBytes) {
+    return std::max(memoryBytes - heldMemoryBytes() - kReaderBytes, memoryBytes / 4);
 }
 
 IsolationLimits limitsToLook() {

@@ -9,15 +9,16 @@ namespace tessera {
 
 /// Bounds on the reading process. 0 means one from the size of the file, see defaultLimits.
 struct IsolationLimits {
-    /// Address space beyond what the program takes when it starts, its threads included: it reads on fewer
-    /// where their stacks would take more than an eighth.
+    /// Of the process and the one that asks it together, while it reads. It may take readingShare() of
+    /// address space beyond what it takes when it starts, its threads included: it reads on fewer where their
+    /// stacks would take more than an eighth.
     std::int64_t memoryBytes = 0;
     double seconds = 0;           ///< from its start to its last byte
     double processorSeconds = 0;  ///< of all its threads together; no bound where only `seconds` is given
 };
 
-/// Three quarters of the memory here.
-std::int64_t mostMemoryBytes();
+/// What a bound leaves for reading: less what this process holds now, and what another takes when it starts.
+std::int64_t readingShare(std::int64_t memoryBytes);
 
 /// Bounds on looking at a file before its usual limits are known.
 IsolationLimits limitsToLook();

@@ -16,6 +16,7 @@
 #include <system_error>
 
 #include "base/child_process.h"
+#include "base/machine_memory.h"
 #include "base/sanitizers.h"
 #include "base/timer.h"
 #include "files/named_file.h"
@@ -205,7 +206,9 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
     lowerLimit(RLIMIT_FSIZE, rlim_t(limits.memoryBytes));  // also the size of the shared memory
     Execution execution;
     execution.threads = threadsWithin(request.threads, limits.memoryBytes);
-    handOver(task->run(request, limits, execution), limits.memoryBytes);
+    // The parent copies what it gets while the packet is still there.
+    const std::int64_t all = isGiven ? request.memoryBytes : readingShare(defaultMemoryBytes());
+    handOver(task->run(request, limits, execution), std::min(limits.memoryBytes, all / 2));
 }
 
 }  // namespace

@@ -87,18 +87,18 @@ int largestResolution(const TetMesh& mesh, const Box3d& meshBox, RefineOptions o
 
 std::string budgetText(const RefineOptions& options, std::size_t maxLeaves) {
     const double brickPoints = std::pow(options.brickCells, 3);
+    const bool byVoxels =
+        options.maxVoxels > 0 && double(maxLeaves + 1) * brickPoints > double(options.maxVoxels);
+    const std::string ofMemory = "the share of the memory here that is taken without --max-memory";
     if (maxLeaves == 0)  // zero voxels would say nothing of the bound that was given
-        return (options.maxVoxels > 0
-                    ? "the given bound of " + shortNumber(double(options.maxVoxels)) + " voxels"
+        return (byVoxels ? "the given bound of " + shortNumber(double(options.maxVoxels)) + " voxels"
                 : options.maxMemoryBytes > 0
                     ? "the given bound of " + shortNumber(double(options.maxMemoryBytes)) + " bytes"
-                    : std::string("a quarter of the memory here")) +
+                    : ofMemory) +
                " holds (one brick is " + shortNumber(brickPoints) + " voxels)";
     const double points = double(maxLeaves) * brickPoints;
     return shortNumber(points) + " voxels (" +
-           (options.maxVoxels > 0 || options.maxMemoryBytes > 0 ? "the given bound"
-                                                                : "a quarter of the memory here") +
-           ")";
+           (byVoxels || options.maxMemoryBytes > 0 ? "the given bound" : ofMemory) + ")";
 }
 
 BrickTree planUniform(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options,

@@ -1,7 +1,5 @@
 #include "refine/plan_frame.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -9,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/machine_memory.h"
 #include "base/parallel.h"
 #include "base/text.h"
 #include "refine/node_set.h"
@@ -232,11 +231,11 @@ std::size_t leafBudget(const RefineOptions& options, int channels) {
     if (options.maxVoxels > 0) {
         points = double(options.maxVoxels);
     } else {
-        const long pages = sysconf(_SC_PHYS_PAGES), pageBytes = sysconf(_SC_PAGE_SIZE);
-        if (pages > 0 && pageBytes > 0)
-            points = std::min(points, double(pages) * double(pageBytes) / 4 / bytesPerPoint);
+        points = std::min(points, double(machineMemoryBytes()) / 4 / bytesPerPoint);
     }
-    if (options.maxMemoryBytes > 0) points = std::min(points, double(options.maxMemoryBytes) / bytesPerPoint);
+    const std::int64_t bytes =
+        options.maxMemoryBytes > 0 ? options.maxMemoryBytes : options.defaultMemoryBytes;
+    if (bytes > 0) points = std::min(points, double(bytes) / bytesPerPoint);
     const double brickPoints = double(options.brickCells) * options.brickCells * options.brickCells;
     return std::size_t(points / brickPoints);
 }

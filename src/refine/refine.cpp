@@ -39,6 +39,8 @@ std::string givenBound(const RefineOptions& options) {
     if (options.maxVoxels > 0) return ", the given bound " + std::to_string(options.maxVoxels) + " voxels";
     if (options.maxMemoryBytes > 0)
         return ", the given bound " + std::to_string(options.maxMemoryBytes) + " bytes";
+    if (options.defaultMemoryBytes > 0)
+        return ", the share of the memory here that is taken without --max-memory";
     return {};
 }
 

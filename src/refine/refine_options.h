@@ -27,7 +27,9 @@ struct RefineOptions {
     std::optional<TransferFunction> transferFunction;  ///< visibility: what is seen
     std::int64_t maxVoxels =
         0;  ///< bound on stored points (leaves x B^3); 0: a default from the memory there is
-    std::int64_t maxMemoryBytes = 0;   ///< bound on the samples' memory; 0: no bound of its own
+    std::int64_t maxMemoryBytes = 0;  ///< bound on the samples' memory; 0: no bound of its own
+    /// Holds where maxMemoryBytes is 0, and isn't one that the caller chose; 0: none.
+    std::int64_t defaultMemoryBytes = 0;
     std::optional<Box3d> boundsWorld;  ///< keep only the points that reading inside this box needs
     std::optional<FixedFrame> frame;   ///< instead of resolution and spacing; level 0 is then its spacing,
                                        ///< even when no brick is so fine

@@ -26,6 +26,12 @@ ResampleStatistics BoundResampler::resampleToDevice(const Lattice& lattice, std:
         lattice, boxes, [&](std::size_t box, const Block& block) { slots.upload(box, block); }, execution);
 }
 
+WorkMemory Resampler::workMemory(int channels) const {
+    // Blocks of 64^3 points in flight, one or two.
+    const std::int64_t bytes = (std::int64_t(16) << 20) + (std::int64_t(2) << 20) * channels;
+    return {0, bytes, bytes};
+}
+
 Block resampleBlock(const Resampler& resampler, const TetMesh& mesh, std::span<const int> fields,
                     const Lattice& lattice, const IndexBox& box, const Execution& execution) {
     Block result;

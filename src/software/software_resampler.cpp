@@ -30,6 +30,9 @@ constexpr int kRegionsPerThread = 4;
 constexpr std::size_t kKeptWorks = 4, kKeptBytes = std::size_t(8) << 20;
 /// Blocks in flight may take this much before regions are worked strictly block by block.
 constexpr std::int64_t kReorderLimitBytes = std::int64_t(256) << 20;
+constexpr std::int64_t kMostWorkBytes = std::int64_t(512) << 20;
+/// Of a point in flight, beside its values.
+constexpr std::int64_t kPointBytes = 13;
 
 // A block being filled, and what decides who owns its points. Kept and used again for the next block.
 struct Work {
@@ -118,17 +121,21 @@ class BoundSoftware : public BoundResampler {
   public:
     BoundSoftware(const TetMesh& mesh, std::span<const int> fields, const BindOptions& options,
                   const ScanTarget& target)
-        : bound_(mesh, fields, options), target_(target), channels_(channelsOf(mesh, fields)) {
+        : bound_(mesh, fields, options),
+          workBytes_(options.workBytes > 0 ? options.workBytes : std::numeric_limits<std::int64_t>::max()),
+          target_(target),
+          channels_(channelsOf(mesh, fields)) {
         if (mesh.elementCount() > kElementMask) throw InputError("a mesh may have at most 2^30 - 1 elements");
     }
 
     std::string_view target() const override { return target_.name; }
 
     ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
-                                const BlockSink& sink, const Execution& execution) override {
+                                const BlockSink& sink, const Execution& given) override {
         checkLattice(lattice, boxes);
         Timer timer;
         ResampleStatistics statistics;
+        const Execution execution = withinMemory(given, boxes);
         const std::vector<Region> regions = planRegions(boxes, execution.threadCount());
         std::vector<IndexBox> regionBoxes;
         regionBoxes.reserve(regions.size());
@@ -205,6 +212,16 @@ class BoundSoftware : public BoundResampler {
     }
 
   private:
+    /// With fewer threads where their blocks would take more than is allowed.
+    Execution withinMemory(const Execution& given, std::span<const IndexBox> boxes) const {
+        std::int64_t points = 1;
+        for (const IndexBox& box : boxes) points = std::max(points, box.count());
+        const std::int64_t ofBlock = points * std::int64_t(4 * channels_.size() + kPointBytes);
+        Execution execution = given;
+        execution.threads = int(std::clamp<std::int64_t>(workBytes_ / ofBlock, 1, given.threadCount()));
+        return execution;
+    }
+
     // Memory that the last call left, so that one brick after another costs no new pages.
     std::vector<std::unique_ptr<Work>> takeIdle() {
         const std::lock_guard lock(idleMutex_);
@@ -224,8 +241,9 @@ class BoundSoftware : public BoundResampler {
         std::vector<std::size_t> order(regions.size());
         for (std::size_t r = 0; r < order.size(); ++r) order[r] = r;
         std::int64_t bytes = 0;
-        for (const IndexBox& box : boxes) bytes += box.count() * std::int64_t(4 * channels_.size() + 5);
-        if (bytes <= kReorderLimitBytes)
+        for (const IndexBox& box : boxes)
+            bytes += box.count() * std::int64_t(4 * channels_.size() + kPointBytes);
+        if (bytes <= std::min(kReorderLimitBytes, workBytes_))
             std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
                 return bins.of(a).size() > bins.of(b).size();
             });
@@ -272,6 +290,7 @@ class BoundSoftware : public BoundResampler {
     std::mutex idleMutex_;
     std::vector<std::unique_ptr<Work>> idle_;
     BoundMesh bound_;
+    std::int64_t workBytes_;
     const ScanTarget& target_;
     std::vector<ScanChannel> channels_;
 };
@@ -282,6 +301,11 @@ std::vector<std::string> SoftwareResampler::targets() const {
     std::vector<std::string> names;
     for (const ScanTarget& target : scanTargets()) names.push_back(target.name);
     return names;
+}
+
+WorkMemory SoftwareResampler::workMemory(int channels) const {
+    const WorkMemory usual = Resampler::workMemory(channels);
+    return {0, usual.least, std::max(usual.least, kMostWorkBytes)};
 }
 
 SoftwareResampler::SoftwareResampler()

@@ -11,6 +11,7 @@ class SoftwareResampler : public Resampler {
   public:
     SoftwareResampler();
     std::vector<std::string> targets() const override;
+    WorkMemory workMemory(int channels) const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
 };

@@ -1,11 +1,10 @@
 #include "vdb/shape_output.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "base/machine_memory.h"
 #include "base/text.h"
 #include "brick/extend.h"
 #include "brick/flatten.h"
@@ -22,12 +21,6 @@ namespace {
 
 constexpr std::int64_t kDefaultFlatPoints = std::int64_t(1) << 26;  // seconds of work
 constexpr std::int64_t kMostFlatPoints = std::int64_t(1) << 31;
-
-std::int64_t quarterOfMemory() {
-    const long pages = sysconf(_SC_PHYS_PAGES), pageBytes = sysconf(_SC_PAGE_SIZE);
-    return pages > 0 && pageBytes > 0 ? std::int64_t(pages) * pageBytes / 4
-                                      : std::numeric_limits<std::int64_t>::max();
-}
 
 int finestLevel(const BrickTree& tree) {
     return tree.leafCount() > 0 ? tree.leaves().front().level : 0;
@@ -50,7 +43,7 @@ FlatBricks makeFlat(const TetMesh& mesh, std::span<const int> fields, const Resa
 
 FlatGridPlan planFlatGrid(const BrickTree& tree, int channels, const OutputShape& shape) {
     const double pointBytes = 4.0 * channels + 0.125;
-    const std::int64_t maxBytes = shape.maxFlatBytes > 0 ? shape.maxFlatBytes : quarterOfMemory();
+    const std::int64_t maxBytes = shape.maxFlatBytes > 0 ? shape.maxFlatBytes : machineMemoryBytes() / 4;
     const std::int64_t byMemory = std::int64_t(double(maxBytes) / pointBytes);
     const int finest = finestLevel(tree);
     // Bricks of one level are the grid already: the plan has bounded them.

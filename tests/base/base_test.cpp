@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -8,6 +12,7 @@
 
 #include "base/check.h"
 #include "base/floor_div.h"
+#include "base/machine_memory.h"
 #include "base/parallel.h"
 #include "base/round_numbers.h"
 #include "base/timer.h"
@@ -125,6 +130,58 @@ TEST(PeakMemory, GrowsWithWhatIsUsed) {
     // A compiler may leave out an allocation that nobody looks at.
     const volatile char* last = &block.back();
     EXPECT_GE(peakMemoryBytes() + *last, before + (32 << 20));
+}
+
+/// A folder that looks like the one where control groups are mounted.
+class ControlGroups : public testing::Test {
+  protected:
+    ControlGroups()
+        : mount_(std::filesystem::path(testing::TempDir()) / ("groups_" + std::to_string(::getpid()))) {}
+    ~ControlGroups() override { std::filesystem::remove_all(mount_); }
+
+    void bound(const std::string& name, const std::string& text) const {
+        std::filesystem::create_directories((mount_ / name).parent_path());
+        std::ofstream(mount_ / name) << text << "\n";
+    }
+    std::int64_t bytes(const std::string& groups) const { return groupMemoryBytes(groups, mount_.string()); }
+
+    const std::int64_t none = std::numeric_limits<std::int64_t>::max();
+
+  private:
+    std::filesystem::path mount_;
+};
+
+TEST_F(ControlGroups, TheLeastBoundOfAGroupAndThoseAboveItHolds) {
+    bound("system.slice/memory.max", "3000000000");
+    bound("system.slice/a.service/memory.max", "max");
+    EXPECT_EQ(bytes("0::/system.slice/a.service\n"), 3000000000);
+    bound("system.slice/a.service/memory.max", "1000000");
+    EXPECT_EQ(bytes("0::/system.slice/a.service\n"), 1000000);
+    EXPECT_EQ(bytes("0::/system.slice\n"), 3000000000);
+    EXPECT_EQ(bytes("0::/user.slice\n"), none);
+}
+
+TEST_F(ControlGroups, InAContainerTheMountIsTheGroup) {
+    bound("memory.max", "2000000");
+    EXPECT_EQ(bytes("0::/\n"), 2000000);
+    EXPECT_EQ(bytes("0::/docker/of/the/host\n"), 2000000);
+    EXPECT_EQ(bytes("0::/../other\n"), 2000000);
+}
+
+TEST_F(ControlGroups, OfVersionOneTheControllerOfMemoryCounts) {
+    bound("memory/job/memory.limit_in_bytes", "5000000");
+    bound("memory/memory.limit_in_bytes", "9223372036854771712");
+    bound("cpu/job/memory.limit_in_bytes", "1");
+    EXPECT_EQ(bytes("11:cpu,cpuacct:/job\n7:memory:/job\n1:name=systemd:/x\n"), 5000000);
+    EXPECT_EQ(bytes("7:hugetlb,memory:/job/step\n"), 5000000);
+    EXPECT_EQ(bytes("7:memory:/\n"), 9223372036854771712);
+}
+
+TEST_F(ControlGroups, WithoutGroupsThereIsNoBound) {
+    for (const char* groups : {"", "\n", "nonsense", "0::", "1:memory", "0::relative\n"})
+        EXPECT_EQ(bytes(groups), none) << groups;
+    EXPECT_GT(machineMemoryBytes(), 1 << 20);
+    EXPECT_EQ(defaultMemoryBytes(), machineMemoryBytes() / 4 * 3);
 }
 
 }  // namespace

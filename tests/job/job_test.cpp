@@ -7,11 +7,13 @@
 #include <memory>
 #include <sstream>
 
+#include "base/machine_memory.h"
 #include "files/atomic_file.h"
 #include "job/cut_mesh.h"
 #include "job/describe_files.h"
 #include "job/focus_path.h"
 #include "job/focus_trace.h"
+#include "job/memory_plan.h"
 #include "job/resample_files.h"
 #include "job/verify_file.h"
 #include "tessera/error.h"
@@ -207,6 +209,53 @@ TEST_F(JobTest, aFocusTraceThatIsCancelledLeavesNothing) {
     job.execution.cancel = &stop;
     EXPECT_THROW(traceFocus(trace, job), Cancelled);
     EXPECT_FALSE(fs::exists(trace.output));
+}
+
+TEST(MemoryPlan, WhatIsSharedOutStaysWithinTheBound) {
+    const TetMesh mesh;
+    for (const Resampler* resampler : resamplers())
+        for (const int channels : {1, 9}) {
+            const WorkMemory work = resampler->workMemory(channels);
+            for (const bool isFlat : {false, true})
+                for (const std::int64_t bound : {std::int64_t(400) << 20, std::int64_t(64) << 30}) {
+                    const MemoryShares shares = shareMemory(bound, mesh, isFlat, work);
+                    EXPECT_GT(shares.levelsBytes, 0);
+                    EXPECT_GE(shares.workBytes, work.least);
+                    EXPECT_LE(shares.workBytes, work.most);
+                    EXPECT_LT(
+                        work.fixed + shares.workBytes + shares.levelsBytes + (isFlat ? shares.flatBytes : 0),
+                        bound);
+                }
+        }
+}
+
+TEST(MemoryPlan, ARefusalSaysWhatIsEnough) {
+    const TetMesh mesh;
+    const WorkMemory work{50 << 20, 20 << 20, 900 << 20};
+    try {
+        shareMemory(100 << 20, mesh, false, work);
+        FAIL();
+    } catch (const InputError& error) {
+        const std::string text = error.what();
+        const std::string option = "--max-memory ";
+        ASSERT_NE(text.rfind(option), std::string::npos) << text;
+        const std::int64_t enough = std::stoll(text.substr(text.rfind(option) + option.size()));
+        EXPECT_NO_THROW(shareMemory(enough << 20, mesh, false, work));
+        EXPECT_THROW(shareMemory((enough - 30) << 20, mesh, false, work), InputError);
+    }
+}
+
+TEST(MemoryPlan, WithoutABoundTheMemoryHereDecides) {
+    const TetMesh mesh;
+    const WorkMemory work{0, 1 << 20, 1 << 20};
+    EXPECT_EQ(shareMemory(0, mesh, false, work).levelsBytes,
+              shareMemory(defaultMemoryBytes(), mesh, false, work).levelsBytes);
+    try {
+        shareMemory(0, mesh, false, {defaultMemoryBytes(), 1 << 20, 1 << 20});
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("without --max-memory"), std::string::npos);
+    }
 }
 
 }  // namespace

@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <thread>
 
 #include "base/floor_div.h"
 #include "raster/channel_coding.h"
+#include "raster/prepared_region.h"
+#include "raster/raster_budget.h"
 #include "raster/regions.h"
 #include "reference/random.h"
 #include "tessera/lattice.h"
@@ -179,6 +183,68 @@ TEST(ChannelCoding, R32fGivesRandomFloatsOfSixtyBinadesBackBitForBit) {
     const ChannelCoding coding(field, 0, SampleFormat::r32f);
     for (const double value : values)
         EXPECT_EQ(bitsOf(coding.decode(float(coding.encode(value)))), bitsOf(float(value)));
+}
+
+TEST(RasterRegions, ACutKeepsEachWantedPointOnce) {
+    const std::vector<IndexBox> boxes{{{0, 0, 0}, {65, 64, 64}}, {{60, 0, 0}, {130, 20, 64}}};
+    for (const std::int64_t pieces : {1, 2, 3, 8, 100, 1 << 20}) {
+        std::vector<RasterRegion> regions;
+        for (RasterRegion& region : planRasterRegions(boxes, 1 << 24))
+            cutRegion(std::move(region), pieces, regions);
+        std::vector<std::int64_t> points(boxes.size());
+        for (std::size_t r = 0; r < regions.size(); ++r) {
+            for (std::size_t other = 0; other < r; ++other)
+                EXPECT_TRUE(intersect(regions[r].points, regions[other].points).empty());
+            for (const RasterRegion::Part& part : regions[r].parts) {
+                EXPECT_EQ(intersect(part.points, regions[r].points), part.points);
+                points[part.box] += part.points.count();
+            }
+            const Vec3i size = regions[r].points.size();
+            EXPECT_GE(std::min({size.x, size.y, size.z}), kShortestEdge);
+            if (pieces == 1 << 20) {
+                EXPECT_LT(std::max({size.x, size.y, size.z}), 2 * kShortestEdge);
+            }
+        }
+        for (std::size_t b = 0; b < boxes.size(); ++b) EXPECT_EQ(points[b], boxes[b].count());
+    }
+}
+
+TEST(RasterBudget, WhatIsSharedOutStaysWithinTheBound) {
+    for (const int channels : {0, 1, 3, 4, 5, 9, 40})
+        for (const std::int64_t more : {0, 100, 3000}) {
+            const WorkMemory memory = rasterWorkMemory(channels);
+            const std::int64_t bytes = memory.least + (more << 20);
+            const RasterBudget budget = shareOut(bytes, channels);
+            const std::int64_t passes = std::max(1, (channels + 3) / 4), code = channels > 1 ? 16 : 4;
+            const std::int64_t records =
+                std::int64_t(sizeof(SliceElement) + sizeof(EasyGeometry)) + 32 * std::max(1, channels);
+            // A target with its depths, images of two regions; records of two regions.
+            EXPECT_LE(budget.regionPoints * (code + 4 + 2 * passes * code) +
+                          budget.regionElements * 2 * records + budget.queueBytes,
+                      bytes);
+            EXPECT_GE(budget.regionPoints, kShortestEdge * kShortestEdge * kShortestEdge);
+            EXPECT_GT(budget.regionElements, 1000);
+        }
+    EXPECT_EQ(shareOut(1, 3).regionPoints, shareOut(rasterWorkMemory(3).least, 3).regionPoints);
+    EXPECT_EQ(shareOut(0, 3).regionPoints, shareOut(rasterWorkMemory(3).most, 3).regionPoints);
+}
+
+TEST(QueueRoom, WaitsUntilThereIsRoom) {
+    QueueRoom room(100);
+    // What is larger than all the room gets in alone.
+    std::shared_ptr<const void> large = room.take(1000);
+    std::atomic<bool> isIn = false;
+    std::thread waiting([&] {
+        const auto small = room.take(60), other = room.take(40);
+        isIn = true;
+    });
+    EXPECT_FALSE(isIn);
+    std::shared_ptr<const void> copy = large;
+    large.reset();
+    EXPECT_FALSE(isIn);
+    copy.reset();
+    waiting.join();
+    EXPECT_TRUE(isIn);
 }
 
 TEST(ChannelCoding, NormalisedFormatsAreWithinHalfAStepAndTheFieldsRange) {

@@ -36,6 +36,26 @@ class RasterRuns : public testing::TestWithParam<GlPlatform> {
     void SetUp() override { TESSERA_NEEDS_GL(GetParam()); }
 };
 
+TEST_P(RasterRuns, SamplesDontDependOnTheMemoryForThem) {
+    TetMesh mesh = boxMesh({.cells = Vec3i(20), .jitter = 0.25, .seed = 3});
+    addRandomField(mesh, "vectors", FieldLocation::point, 4, 0, 1, 7);
+    addElementIdField(mesh, "element");
+    const std::vector<int> fields{0, 1};  // two passes
+    const IndexBox box = centredBox(90);
+    const Lattice lattice = centredLattice(90);
+    for (const std::string_view algorithm : kAlgorithms) {
+        BindOptions options = on(GetParam());
+        const auto plenty = sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+        options.workBytes = 1;
+        const auto least = sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+        // There were more regions, so elements were counted more often.
+        EXPECT_GT(least.statistics.count(counted::elementBlockPairs),
+                  plenty.statistics.count(counted::elementBlockPairs));
+        ASSERT_EQ(least.blocks[0].coverage, plenty.blocks[0].coverage);
+        ASSERT_EQ(least.blocks[0].values, plenty.blocks[0].values);
+    }
+}
+
 TEST_P(RasterRuns, AThousandLeakNeitherObjectsNorMemory) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> one{0}, all{0, 1, 2};
