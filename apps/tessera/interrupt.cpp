@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 
 #include "base/sanitizers.h"
 #include "files/atomic_file.h"
@@ -80,12 +81,21 @@ void endAtOnce(int number) {
     _exit(128 + number);
 }
 
+/// Where a library fails to set itself up.
+[[noreturn]] void endBeforeMain() {
+    constexpr char kLine[] =
+        "tessera: its libraries can't start: memory or threads are too few (ulimit -v, ulimit -u)\n";
+    [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kLine, sizeof kLine - 1);
+    _exit(1);
+}
+
 // Libraries take a tenth of a second to set themselves up before main(): nothing is begun by then. While the
 // system still loads them a signal just ends the program, without a line.
-void catchEarlyInterrupts() {
+void catchEarlyEnds() {
     catchInterrupts(endAtOnce);
+    std::set_terminate(endBeforeMain);
 }
-[[gnu::used, gnu::section(".preinit_array")]] void (*const beforeLibraries)() = catchEarlyInterrupts;
+[[gnu::used, gnu::section(".preinit_array")]] void (*const beforeLibraries)() = catchEarlyEnds;
 #endif
 
 }  // namespace

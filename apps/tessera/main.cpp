@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <new>
@@ -102,6 +103,7 @@ int main(int argc, char** argv) {
     tessera::noteStart();
     tessera::installInterruptHandlers();
     std::set_terminate(endOutOfMemory);
+    ::setenv("EGL_LOG_LEVEL", "fatal", 0);  // what drivers lack is told by us, in one line
     try {
         return codeAfterOutput(run(tessera::parseCommandLine(argc, argv)));
     } catch (const tessera::Cancelled&) {

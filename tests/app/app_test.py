@@ -2126,6 +2126,18 @@ class Reader(AppTest):
         self.reject(2, "started by tessera itself", "read-mesh")
         self.reject(2, "started by tessera itself", "read-mesh", "1", "1000", "1", "-1", self.cube)
 
+    def test_libraries_that_can_not_start_are_one_line(self):
+        ends = set()
+        for mebibytes in range(150, 301, 25):
+            def limit():
+                resource.setrlimit(resource.RLIMIT_AS, (mebibytes << 20, mebibytes << 20))
+
+            result = self.run_tessera("info", self.cube, preexec_fn=limit)
+            ends.add(result.returncode)
+            self.assertIn(result.returncode, (0, 1, 127), result.stderr)  # 127: the system can't load them
+            self.assertEqual(len(result.stderr.splitlines()), 0 if result.returncode == 0 else 1, result.stderr)
+        self.assertTrue(ends - {127})
+
     def test_no_address_space_is_enough_or_one_line(self):
         """Whatever memory there is: done, or one line and no file."""
         seen = set()
