@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "base/text.h"
 #include "gl/gl_platform.h"
-#include "job/wrap_text.h"
 #include "tessera/error.h"
 #include "window.h"
 
@@ -23,7 +23,7 @@ constexpr int kExitFailure = 1;
 constexpr int kExitBadInput = 2;
 
 void printError(const char* message) {
-    std::fputs(("tessera: " + tessera::singleLine(message) + "\n").c_str(), stderr);
+    std::fputs(("tessera: " + tessera::messageLine(message) + "\n").c_str(), stderr);
 }
 
 /// The tessera program that this one is installed with; empty where there is none.

@@ -29,7 +29,7 @@ constexpr int kExitBadInput = 2;
 /// One line on standard error, whatever the message holds. Where it can't be written the exit code has to do.
 void printError(const char* message) {
     const auto pause = tessera::pauseProgress();
-    std::fputs(("tessera: " + tessera::messageLine(tessera::singleLine(message)) + "\n").c_str(), stderr);
+    std::fputs(("tessera: " + tessera::messageLine(message) + "\n").c_str(), stderr);
 }
 
 /// What is printed must never reach a file that happens to get the number of a closed stream: such streams

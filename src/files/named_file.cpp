@@ -9,9 +9,11 @@ namespace tessera {
 
 void checkInFolder(const std::string& folder, const std::string& by, const std::string& named) {
     namespace fs = std::filesystem;
-    std::error_code error;
-    const fs::path root = fs::weakly_canonical(folder, error), place = fs::weakly_canonical(named, error);
-    if (!error && std::mismatch(root.begin(), root.end(), place.begin(), place.end()).first == root.end())
+    std::error_code noFolder, noPlace;
+    const fs::path root = fs::weakly_canonical(folder, noFolder),
+                   place = fs::weakly_canonical(named, noPlace);
+    if (!noFolder && !noPlace && !root.empty() &&
+        std::mismatch(root.begin(), root.end(), place.begin(), place.end()).first == root.end())
         return;
     throw InputError(by + ": names " + named + ", which lies outside the folder " + folder +
                      "; --follow-links lets files name others anywhere");

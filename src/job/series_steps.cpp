@@ -6,7 +6,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "files/named_file.h"
 #include "mesh/field_range.h"
 #include "tessera/error.h"
 
@@ -78,7 +77,7 @@ SeriesStep chosenStep(const std::string& collection, int number) {
 
 ReadOptions readOptions(const SeriesStep& step, std::vector<std::string> fields, int timeStep) {
     ReadOptions options{std::move(fields), timeStep, {step.files.begin() + 1, step.files.end()}};
-    if (!step.collection.empty()) options.folder = folderOf(step.collection);
+    options.namedBy = step.collection;
     return options;
 }
 

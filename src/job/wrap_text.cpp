@@ -78,17 +78,4 @@ std::string wrapLines(const std::string& text, std::size_t width) {
     return wrapped;
 }
 
-std::string withoutControls(std::string text) {
-    for (char& c : text)
-        if ((static_cast<unsigned char>(c) < 0x20 && c != '\n') || c == 0x7f) c = ' ';
-    return text;
-}
-
-std::string singleLine(std::string text) {
-    text = withoutControls(std::move(text));
-    std::replace(text.begin(), text.end(), '\n', ' ');
-    text.erase(text.find_last_not_of(' ') + 1);
-    return text;
-}
-
 }  // namespace tessera

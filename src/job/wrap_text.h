@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "base/text.h"
+
 namespace tessera {
 
 /// Columns of text where nothing says how many there are.
@@ -20,10 +22,5 @@ inline constexpr std::size_t kTitleNameColumns = 80;
 std::string wrapLine(const std::string& line, std::size_t width, std::size_t indent);
 /// The same for every line of a text, continued four columns further right than it begins.
 std::string wrapLines(const std::string& text, std::size_t width);
-
-/// Names in a file may hold what a terminal obeys: control characters become spaces, but for line ends.
-std::string withoutControls(std::string text);
-/// The same with line ends as spaces too, and no space at the end.
-std::string singleLine(std::string text);
 
 }  // namespace tessera

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 
-#include "files/named_file.h"
 #include "library/program.h"
 #include "mesh_files/mesh_series.h"
 #include "reader/isolated_reader.h"
@@ -22,11 +21,11 @@ IsolatedReader findReader(const std::string& given) {
     return {program, {"read-mesh"}, quickReaderBeside(program)};
 }
 
-InputMesh readFiles(const std::vector<std::string>& files, const std::string& folder, int step,
+InputMesh readFiles(const std::vector<std::string>& files, const std::string& collection, int step,
                     const InputOptions& options, const Execution& execution) {
     if (files.empty()) throw InputError("a step without a file can't be read");
     const ReadOptions read{
-        options.fields, step, {files.begin() + 1, files.end()}, folder, options.followsLinks};
+        options.fields, step, {files.begin() + 1, files.end()}, collection, options.followsLinks};
     execution.report(Stage::reading, 0, 1);
     IsolationLimits limits;
     limits.memoryBytes = options.maxMemoryBytes;
@@ -43,8 +42,7 @@ InputMesh readFiles(const std::vector<std::string>& files, const std::string& fo
 }  // namespace
 
 InputMesh read(const InputStep& step, const InputOptions& options, const Execution& execution) {
-    InputMesh input = readFiles(step.files, step.collection.empty() ? "" : folderOf(step.collection),
-                                options.step, options, execution);
+    InputMesh input = readFiles(step.files, step.collection, options.step, options, execution);
     input.time = step.time;
     // The parts of a mesh have the name of the file that lists them.
     if (step.files.size() > 1) input.sourceFile = std::filesystem::path(step.collection).filename().string();

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/parallel.h"
+#include "base/text.h"
 #include "files/name_list.h"
 #include "mesh/mesh_quality.h"
 #include "mesh_files/join_parts.h"
@@ -372,9 +373,10 @@ bool isFieldCalled(const std::string& called, const std::string& name, FieldLoca
 
 bool isWanted(const ReadOptions& options, const std::string& name, FieldLocation location) {
     if (options.fields.empty()) return true;
+    const std::string plain = plainName(name);
     return std::any_of(options.fields.begin(), options.fields.end(), [&](const std::string& called) {
-        return isFieldCalled(called, name, location) ||
-               (location == FieldLocation::cell && called == cellFieldName(name));
+        return isFieldCalled(called, plain, location) ||
+               (location == FieldLocation::cell && called == cellFieldName(plain));
     });
 }
 

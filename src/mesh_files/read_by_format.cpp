@@ -115,7 +115,7 @@ void warnOfEmptyPart(const RawMesh& part, const std::string& path, ImportStatist
 
 std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options) {
     if (options.followsLinks) return std::nullopt;
-    return options.folder.empty() ? folderOf(path) : options.folder;
+    return folderOf(options.namedBy.empty() ? path : options.namedBy);
 }
 
 void checkParts(const std::string& path, const ReadOptions& options) {

@@ -43,8 +43,9 @@ struct ReadOptions {
     std::vector<std::string> fields;        ///< names to read; empty: all
     int timeStep = -1;                      ///< formats with steps: which one, counted from 0; -1: the last
     std::vector<std::string> otherParts{};  ///< further files of the same format that hold parts of this mesh
-    /// Files may name others in this folder and below it; empty: the folder of the file that is read.
-    std::string folder{};
+    /// The file that names this one, a .pvd file; empty: none. In its folder and below it files may name
+    /// others, else in the folder of the file that is read.
+    std::string namedBy{};
     bool followsLinks = false;  ///< they may name others anywhere
 };
 

@@ -25,6 +25,7 @@
 
 #include "base/large_pages.h"
 #include "base/parallel.h"
+#include "base/text.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -178,7 +179,7 @@ void copyFields(const std::string& path, vtkDataSetAttributes* attributes, Field
     for (int a = 0; a < attributes->GetNumberOfArrays(); ++a) {
         vtkAbstractArray* abstract = attributes->GetAbstractArray(a);
         if (!abstract) continue;
-        std::string name = abstract->GetName() ? abstract->GetName() : "";
+        std::string name = plainName(abstract->GetName() ? abstract->GetName() : "");
         if (isInternalName(name)) continue;
         if (name.empty())
             name =

@@ -18,6 +18,25 @@ class StoredReader {
   public:
     StoredReader(const BrickTree& tree, const BrickStore& store) : tree_(tree), store_(store) {}
 
+    /// Whether no point of a leaf can have a value: nothing is stored in it, nor next to it.
+    bool isBare(std::size_t leaf) const {
+        const BrickKey& key = tree_.leaves()[leaf];
+        for (int n = 0; n < 27; ++n) {
+            const std::int64_t near =
+                tree_.findLeaf({key.level, key.index + Vec3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1)});
+            for (int t = 0; near >= 0 && t < store_.tileCount(); ++t)
+                if (store_.tile(std::size_t(near), t)) return false;
+        }
+        if (store_.extension().empty() && store_.surface().empty()) return true;
+        const IndexBox box = tree_.closedPoints(key);
+        const Vec3i first = floorDiv(box.min, kTileSize), last = floorDiv(box.max - 1, kTileSize);
+        TileKey tile{key.level, first};
+        for (tile.index.z = first.z; tile.index.z <= last.z; ++tile.index.z)
+            for (tile.index.y = first.y; tile.index.y <= last.y; ++tile.index.y)
+                for (tile.index.x = first.x; tile.index.x <= last.x; ++tile.index.x)
+                    if (store_.extension().contains(tile) || store_.surface().contains(tile)) return false;
+        return true;
+    }
     std::shared_ptr<const Block> read(std::size_t leaf) {
         const BrickKey& key = tree_.leaves()[leaf];
         const IndexBox owned = tree_.ownedPoints(key);
@@ -152,11 +171,13 @@ StoredBricks showStored(const BrickTree& tree, const BrickStore& store, const St
     StoredReader reader(tree, store);
     parallelFor(execution, std::int64_t(tree.leafCount()), [&](std::int64_t i) {
         const auto leaf = std::size_t(i);
+        if (reader.isBare(leaf)) return;
         const BrickKey& key = tree.leaves()[leaf];
         const Depth depth(tree.levelCount() - 1 - key.level);
         stored.bricks[leaf] = {
             {{depth, key.index}, std::uint32_t(leaf)}, reader.read(leaf), reader.readSurface(leaf)};
     });
+    std::erase_if(stored.bricks, [](const ShownBrick& brick) { return !brick.samples; });
     stored.estimatedPoints = reader.estimated();
     stored.missingPoints = reader.missing();
     addNotes(traits, stored);

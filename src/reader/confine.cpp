@@ -1,7 +1,9 @@
 #include "reader/confine.h"
 
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <linux/landlock.h>
+#include <sys/file.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -21,9 +23,17 @@ namespace tessera {
 namespace {
 
 constexpr std::uint64_t kReadFolder = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
-// Rights that the first version of Landlock knows, and those that came with the second and the third:
-// numbers, as headers may be older than the kernel.
-constexpr std::uint64_t kRights1 = (1u << 13) - 1, kRights2 = 1u << 13, kRights3 = 1u << 14;
+
+/// What is given up, by version of Landlock: numbers, as headers may be older than the kernel.
+struct LandlockRules {
+    std::uint64_t files = (1u << 13) - 1;  ///< the second adds one, the third another
+    std::uint64_t network = 3;             ///< from the fourth
+    std::uint64_t scopes = 3;              ///< from the sixth: sockets and signals of others
+};
+
+std::size_t sizeForVersion(int version) {
+    return version >= 6 ? sizeof(LandlockRules) : (version >= 4 ? 2 : 1) * sizeof(std::uint64_t);
+}
 
 int landlockVersion() {
     return int(::syscall(SYS_landlock_create_ruleset, nullptr, 0, LANDLOCK_CREATE_RULESET_VERSION));
@@ -45,9 +55,9 @@ void allowReading(int rules, const std::string& path) {
 void confineFiles(std::span<const std::string> readable) {
     const int version = landlockVersion();
     if (version < 1) return;
-    landlock_ruleset_attr handled{};
-    handled.handled_access_fs = kRights1 | (version >= 2 ? kRights2 : 0) | (version >= 3 ? kRights3 : 0);
-    const int rules = int(::syscall(SYS_landlock_create_ruleset, &handled, sizeof handled, 0));
+    LandlockRules handled;
+    handled.files |= (version >= 2 ? 1u << 13 : 0) | (version >= 3 ? 1u << 14 : 0);
+    const int rules = int(::syscall(SYS_landlock_create_ruleset, &handled, sizeForVersion(version), 0));
     if (rules < 0) return;
     for (const char* folder : {"/usr", "/lib", "/lib64", "/etc/ld.so.cache", "/proc/self", "/proc/meminfo",
                                "/sys/devices/system", "/sys/kernel/mm", "/dev/null", "/dev/urandom"})
@@ -66,22 +76,21 @@ constexpr std::array kCalls{
     SCMP_SYS(close), SCMP_SYS(lseek), SCMP_SYS(fstat), SCMP_SYS(newfstatat), SCMP_SYS(stat), SCMP_SYS(lstat),
     SCMP_SYS(statx), SCMP_SYS(statfs), SCMP_SYS(fstatfs), SCMP_SYS(access), SCMP_SYS(faccessat),
     SCMP_SYS(faccessat2), SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(getdents64), SCMP_SYS(getcwd),
-    SCMP_SYS(fcntl), SCMP_SYS(flock), SCMP_SYS(fadvise64), SCMP_SYS(ftruncate), SCMP_SYS(dup), SCMP_SYS(poll),
-    SCMP_SYS(ppoll),
+    SCMP_SYS(fadvise64), SCMP_SYS(ftruncate), SCMP_SYS(dup), SCMP_SYS(poll), SCMP_SYS(ppoll),
     // memory
     SCMP_SYS(brk), SCMP_SYS(mmap), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(mprotect), SCMP_SYS(madvise),
     SCMP_SYS(mbind), SCMP_SYS(get_mempolicy),
     // threads and signals of this process
     SCMP_SYS(futex), SCMP_SYS(set_robust_list), SCMP_SYS(get_robust_list), SCMP_SYS(set_tid_address),
-    SCMP_SYS(rseq), SCMP_SYS(arch_prctl), SCMP_SYS(prctl), SCMP_SYS(exit), SCMP_SYS(exit_group),
-    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack),
-    SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(gettid), SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity),
+    SCMP_SYS(rseq), SCMP_SYS(arch_prctl), SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(rt_sigaction),
+    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sigaltstack), SCMP_SYS(getpid),
+    SCMP_SYS(getppid), SCMP_SYS(gettid), SCMP_SYS(sched_yield), SCMP_SYS(sched_getaffinity),
     SCMP_SYS(sched_getparam), SCMP_SYS(sched_getscheduler), SCMP_SYS(restart_syscall), SCMP_SYS(membarrier),
     // what there is of time, memory and processors; who this is
     SCMP_SYS(clock_gettime), SCMP_SYS(clock_getres), SCMP_SYS(clock_nanosleep), SCMP_SYS(nanosleep),
     SCMP_SYS(gettimeofday), SCMP_SYS(time), SCMP_SYS(times), SCMP_SYS(getrusage), SCMP_SYS(getrlimit),
-    SCMP_SYS(setrlimit), SCMP_SYS(sysinfo), SCMP_SYS(uname), SCMP_SYS(getcpu), SCMP_SYS(getrandom),
-    SCMP_SYS(getuid), SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getegid)};
+    SCMP_SYS(sysinfo), SCMP_SYS(uname), SCMP_SYS(getcpu), SCMP_SYS(getrandom), SCMP_SYS(getuid),
+    SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getegid)};
 
 void confineCalls() {
     const scmp_filter_ctx filter = ::seccomp_init(SCMP_ACT_ERRNO(ENOSYS));
@@ -92,13 +101,18 @@ void confineCalls() {
                                             where.begin()) == 0;
     };
     for (const int call : kCalls) allow(call, {});
-    // Opening to read; threads, no processes; its own signals and limits.
+    // Opening to read; threads, no processes; its own signals and limits; descriptors as they are.
     constexpr scmp_datum_t kWays = O_ACCMODE | O_CREAT | O_TRUNC;
     allow(SCMP_SYS(open), {SCMP_A1(SCMP_CMP_MASKED_EQ, kWays, O_RDONLY)});
     allow(SCMP_SYS(openat), {SCMP_A2(SCMP_CMP_MASKED_EQ, kWays, O_RDONLY)});
     allow(SCMP_SYS(clone), {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD)});
     allow(SCMP_SYS(tgkill), {SCMP_A0(SCMP_CMP_EQ, scmp_datum_t(::getpid()), 0)});
     allow(SCMP_SYS(prlimit64), {SCMP_A0(SCMP_CMP_EQ, 0, 0)});
+    allow(SCMP_SYS(prctl), {SCMP_A0(SCMP_CMP_EQ, PR_SET_NAME, 0)});
+    for (const int command : {F_GETFD, F_SETFD, F_GETFL, F_DUPFD, F_DUPFD_CLOEXEC})
+        allow(SCMP_SYS(fcntl), {SCMP_A1(SCMP_CMP_EQ, scmp_datum_t(command), 0)});
+    for (const int lock : {LOCK_SH, LOCK_SH | LOCK_NB, LOCK_UN})
+        allow(SCMP_SYS(flock), {SCMP_A1(SCMP_CMP_EQ, scmp_datum_t(lock), 0)});
     if (isWhole) ::seccomp_load(filter);
     ::seccomp_release(filter);
 }
@@ -114,6 +128,21 @@ bool hasFilter() {
 }
 #endif
 
+/// What a superuser may do beyond reading others' files: raise limits, say.
+void dropCapabilities() {
+    __user_cap_header_struct head{_LINUX_CAPABILITY_VERSION_3, 0};
+    std::array<__user_cap_data_struct, 2> kept{};
+    if (::syscall(SYS_capget, &head, kept.data()) != 0) return;
+    constexpr unsigned kReading = 1u << CAP_DAC_OVERRIDE | 1u << CAP_DAC_READ_SEARCH;
+    for (__user_cap_data_struct& word : kept) {
+        const unsigned mask = &word == kept.data() ? kReading : 0;
+        word.effective &= mask;
+        word.permitted &= mask;
+        word.inheritable = 0;
+    }
+    ::syscall(SYS_capset, &head, kept.data());
+}
+
 }  // namespace
 
 Confinement availableConfinement() {
@@ -121,6 +150,7 @@ Confinement availableConfinement() {
 }
 
 void confine(std::span<const std::string> readable) {
+    dropCapabilities();
     if (::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) return;
     confineFiles(readable);
     confineCalls();

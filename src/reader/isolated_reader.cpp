@@ -16,6 +16,7 @@
 #include <optional>
 
 #include "base/machine_memory.h"
+#include "base/text.h"
 #include "base/timer.h"
 #include "mesh_files/raw_mesh.h"
 #include "reader/mesh_packet.h"
@@ -28,6 +29,7 @@ namespace tessera {
 namespace {
 
 constexpr int kTickMs = 50;
+constexpr double kMostSeconds = 10 * 86400;  // that a reader may ask for
 constexpr const char* kSuspicion = "; the file is damaged, or hits a bug of the library that reads it";
 
 std::string inMiB(std::int64_t bytes) {
@@ -57,20 +59,20 @@ class IsolatedReading {
         sent_ = words.take() + text;
     }
 
-    using Take = std::function<void(std::span<const std::byte>)>;
-    void run(const IsolatedReader& reader, const Take& take);
+    void run(const IsolatedReader& reader, const TakeAnswer& take);
 
   private:
     void setLimits(const IsolationLimits& usual);
     void takeLimits(const ReaderProcess& process);
-    void takeAnswer(ReaderProcess& process, const Take& take);
-    bool readQuickly(const std::string& executable, const Take& take);
+    void takeAnswer(ReaderProcess& process, const TakeAnswer& take);
+    bool readQuickly(const std::string& executable, const TakeAnswer& take);
     bool awaitReport(ReaderProcess& process);
     void checkTimes(double spentMs, const ReaderProcess& process) const;
     void send(int descriptor);
     bool receive(int descriptor);
     bool isComplete() const;
     ReportStart start() const;
+    std::int64_t mostHandedOver() const { return limits_.memoryBytes / kHandedOverShare; }
     [[noreturn]] void rethrow(ReaderOutcome outcome, const std::string& message) const;
     [[noreturn]] void failWithGarbage(const std::string& why) const;
     [[noreturn]] void failWithEnd(const ProcessEnd& end) const;
@@ -120,7 +122,7 @@ bool IsolatedReading::isComplete() const {
     if (report_.size() < sizeof(ReportStart)) return false;
     const ReportStart s = start();
     const std::uint64_t most =
-        s.outcome == ReaderOutcome::answerFollows ? std::uint64_t(limits_.memoryBytes) : kLongestMessageBytes;
+        s.outcome == ReaderOutcome::answerFollows ? std::uint64_t(mostHandedOver()) : kLongestMessageBytes;
     if (s.magic != ReportStart::kMagic || s.outcome > ReaderOutcome::outOfMemory || s.bytes > most ||
         report_.size() - sizeof s > s.bytes)
         failWithGarbage("its report makes no sense");
@@ -176,7 +178,8 @@ void IsolatedReading::takeLimits(const ReaderProcess& process) {
     IsolationLimits usual;
     if (report_.size() != sizeof(ReportStart) + sizeof usual) failWithGarbage("its limits make no sense");
     std::memcpy(&usual, report_.data() + sizeof(ReportStart), sizeof usual);
-    if (!(usual.memoryBytes > 0 && usual.seconds > 0 && usual.processorSeconds > 0))
+    const auto isTime = [](double seconds) { return seconds > 0 && seconds <= kMostSeconds; };
+    if (!(usual.memoryBytes > 0 && isTime(usual.seconds) && isTime(usual.processorSeconds)))
         failWithGarbage("its limits make no sense");
     setLimits(usual);
     limits_.memoryBytes = std::min(limits_.memoryBytes, std::max(given_.memoryBytes, defaultMemoryBytes()));
@@ -191,15 +194,16 @@ bool IsolatedReading::awaitReport(ReaderProcess& process) {
     sentBytes_ = 0;
     double spentMs = 0;
     Timer timer;
+    bool hasLimits = false;
     while (true) {
         execution_.throwIfCancelled();
         send(process.reports());
         const bool open = receive(process.reports());
-        if (isComplete() && start().outcome == ReaderOutcome::limits) {
-            takeLimits(process);
-            continue;
-        }
-        if (isComplete()) return true;
+        const bool isWhole = isComplete(), givesLimits = isWhole && start().outcome == ReaderOutcome::limits;
+        if (givesLimits && hasLimits) failWithGarbage("it sets its limits twice");
+        if (givesLimits) takeLimits(process);
+        hasLimits = hasLimits || givesLimits;
+        if (isWhole && !givesLimits) return true;
         if (!open) return false;
         // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the reader's.
         spentMs += std::min(timer.restart(), 5.0 * kTickMs);
@@ -233,14 +237,14 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
 }
 
 /// The answer, or the error, of a report that is whole.
-void IsolatedReading::takeAnswer(ReaderProcess& process, const Take& take) {
+void IsolatedReading::takeAnswer(ReaderProcess& process, const TakeAnswer& take) {
     process.end();  // before what it handed over is copied
     const ReportStart answer = start();
     const std::span<const std::byte> rest = std::span(report_).subspan(sizeof answer);
     try {
-        if (answer.outcome == ReaderOutcome::answerFollows) return take(rest);
+        if (answer.outcome == ReaderOutcome::answerFollows) return take(rest, mostHandedOver());
         if (answer.outcome == ReaderOutcome::answerInMemory)
-            return take(SealedMemory(process.answer(), limits_.memoryBytes).bytes());
+            return take(SealedMemory(process.answer(), mostHandedOver()).bytes(), mostHandedOver());
     } catch (const DamagedPacket& damage) {
         failWithGarbage(damage.what());
     }
@@ -249,7 +253,7 @@ void IsolatedReading::takeAnswer(ReaderProcess& process, const Take& take) {
 
 /// False when the program doesn't read this format, or can't be used: isn't one, is of another build, lacks a
 /// library.
-bool IsolatedReading::readQuickly(const std::string& executable, const Take& take) {
+bool IsolatedReading::readQuickly(const std::string& executable, const TakeAnswer& take) {
     std::optional<ReaderProcess> process;
     try {
         process.emplace(executable, startWords(request_.parent));
@@ -266,7 +270,7 @@ bool IsolatedReading::readQuickly(const std::string& executable, const Take& tak
     return true;
 }
 
-void IsolatedReading::run(const IsolatedReader& reader, const Take& take) {
+void IsolatedReading::run(const IsolatedReader& reader, const TakeAnswer& take) {
     if (!reader.quickExecutable.empty() && readQuickly(reader.quickExecutable, take)) return;
     std::vector<std::string> words = reader.arguments;
     for (std::string& word : startWords(request_.parent)) words.push_back(std::move(word));
@@ -290,8 +294,7 @@ std::string quickReaderBeside(const std::string& executable) {
 }
 
 void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
-               const IsolationLimits& limits, const Execution& execution,
-               const std::function<void(std::span<const std::byte>)>& take) {
+               const IsolationLimits& limits, const Execution& execution, const TakeAnswer& take) {
     execution.throwIfCancelled();
     IsolatedReading(std::move(request), name, limits, execution).run(reader, take);
 }
@@ -303,7 +306,7 @@ MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path,
     request.options = options;
     MeshFile file;
     askReader(reader, std::move(request), meshName(path, options), limits, execution,
-              [&](std::span<const std::byte> packet) {
+              [&](std::span<const std::byte> packet, std::int64_t) {
                   const std::int64_t heldBytes = residentMemoryBytes();
                   file = unpackMesh(packet, execution);
                   file.readPeakBytes += heldBytes;

@@ -26,6 +26,9 @@ struct IsolatedReader {
 /// The built or installed tessera_read_mesh that belongs to a tessera program; empty when there is none.
 std::string quickReaderBeside(const std::string& executable);
 
+/// Takes an answer's packet. @param mostBytes that it and what is made of it may take.
+using TakeAnswer = std::function<void(std::span<const std::byte> packet, std::int64_t mostBytes)>;
+
 /// Has a process of its own do a task, which takes crashes, endless loops and endless demands for memory with
 /// it: they become an InputError that begins with `name` and says what happened. Its errors keep their type
 /// and words. The answer comes through memory that both share, sealed.
@@ -33,8 +36,7 @@ std::string quickReaderBeside(const std::string& executable);
 /// packet, and throws DamagedPacket where that isn't sound. Throws IoError when the process can't be started,
 /// std::bad_alloc when this one's own address space is too small.
 void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
-               const IsolationLimits& limits, const Execution& execution,
-               const std::function<void(std::span<const std::byte>)>& take);
+               const IsolationLimits& limits, const Execution& execution, const TakeAnswer& take);
 
 /// readMesh by askReader. Errors, warnings and the mesh are those of readMesh, bit for bit.
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,

@@ -17,13 +17,10 @@ constexpr const char* kWhole = "vdb";
 constexpr const char* kWithoutValues = "vdb-without-values";
 constexpr const char* kLattice = "vdb-lattice";
 constexpr const char* kSamples = "vdb-samples";
-// A store is unpacked beside its packet: small files stay small on both sides.
-constexpr std::int64_t kHandedOverShare = 3;
 
 /// OpenVDB needs no companion files, so none is asked for.
 void ask(IsolatedReader reader, const std::string& path, const char* task, std::string body,
-         const IsolationLimits& limits, const Execution& execution,
-         const std::function<void(std::span<const std::byte>)>& take) {
+         const IsolationLimits& limits, const Execution& execution, const TakeAnswer& take) {
     reader.quickExecutable.clear();
     ReaderRequest request;
     request.path = path;
@@ -114,14 +111,16 @@ VdbFile readVdbIsolated(const IsolatedReader& reader, const std::string& path, V
                         const IsolationLimits& limits, const Execution& execution) {
     VdbFile file;
     ask(reader, path, contents == VdbContents::all ? kWhole : kWithoutValues, {}, limits, execution,
-        [&](std::span<const std::byte> packet) { file = unpackVdb(packet, execution); });
+        [&](std::span<const std::byte> packet, std::int64_t mostBytes) {
+            file = unpackVdb(packet, mostBytes, execution);
+        });
     return file;
 }
 
 FixedFrame readVdbLatticeIsolated(const IsolatedReader& reader, const std::string& path,
                                   const IsolationLimits& limits, const Execution& execution) {
     FixedFrame frame;
-    ask(reader, path, kLattice, {}, limits, execution, [&](std::span<const std::byte> packet) {
+    ask(reader, path, kLattice, {}, limits, execution, [&](std::span<const std::byte> packet, std::int64_t) {
         HeadReader head = ReceivedPacket(packet).head();
         for (double* number :
              {&frame.originWorld.x, &frame.originWorld.y, &frame.originWorld.z, &frame.spacingWorld}) {
@@ -138,7 +137,7 @@ GridSampler isolatedGridSampler(const IsolatedReader& reader, const IsolationLim
     return [&](const std::string& path, std::span<const std::vector<GridPlace>> places,
                std::span<const GridQuestion> questions) {
         std::vector<std::vector<GridReading>> answers;
-        const auto take = [&](std::span<const std::byte> bytes) {
+        const auto take = [&](std::span<const std::byte> bytes, std::int64_t) {
             ReceivedPacket packet(bytes);
             HeadReader head = packet.head();
             for (const GridQuestion& question : questions) {

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "base/parallel.h"
+#include "base/text.h"
 
 namespace tessera {
 
@@ -58,16 +59,21 @@ MeshFile readHead(const ReceivedPacket& packet, std::int64_t& nodes, std::int64_
     for (std::int64_t f = 0; f < fields; ++f) {
         Field& field = file.mesh.fields.emplace_back();
         field.name = head.getText();
+        if (field.name.empty() || field.name != plainName(field.name))
+            throw DamagedPacket("a field has no proper name");
         field.location =
             head.getCount(1, "as a field's place") == 0 ? FieldLocation::point : FieldLocation::cell;
         field.components = int(head.getCount(9, "components in a field"));
         if (field.components == 0) throw DamagedPacket("a field has no components");
     }
     file.readPeakBytes = head.getCount(std::int64_t(1) << 60, "bytes of memory");
-    file.statistics.format = head.getText();
-    visitNumbers(file.statistics,
-                 [&](auto& number) { number = head.get<std::remove_reference_t<decltype(number)>>(); });
+    file.statistics.format = messageLine(head.getText());
+    visitNumbers(file.statistics, [&](auto& number) {
+        number = head.get<std::remove_reference_t<decltype(number)>>();
+        if (!(number >= 0)) throw DamagedPacket("a number is below 0");
+    });
     file.statistics.warnings = head.getTexts();
+    for (std::string& warning : file.statistics.warnings) warning = messageLine(warning);
     head.expectEnd();
     return file;
 }

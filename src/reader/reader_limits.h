@@ -20,6 +20,9 @@ struct IsolationLimits {
 /// What a bound leaves for reading: less what this process holds now, and what another takes when it starts.
 std::int64_t readingShare(std::int64_t memoryBytes);
 
+/// What a process hands over is no more than this part of its memory: it is copied from there.
+inline constexpr std::int64_t kHandedOverShare = 2;
+
 /// Bounds on looking at a file before its usual limits are known.
 IsolationLimits limitsToLook();
 

@@ -34,6 +34,8 @@ SealedMemory::SealedMemory(int descriptor, std::int64_t mostBytes) {
     if (seals < 0 || (seals & kSeals) != kSeals || ::fstat(descriptor, &status) != 0)
         throw DamagedPacket("its memory can't be sealed");
     if (status.st_size > mostBytes) throw DamagedPacket("it is larger than the limit");
+    // Holes cost the child nothing, and would be filled here.
+    if (std::int64_t(status.st_blocks) * 512 < status.st_size) throw DamagedPacket("it has holes");
     if (status.st_size == 0) return;
     const auto size = std::size_t(status.st_size);
     void* memory = ::mmap(nullptr, size, PROT_READ, MAP_SHARED | MAP_POPULATE, descriptor, 0);

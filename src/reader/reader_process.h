@@ -19,7 +19,7 @@ constexpr int kAnswerDescriptor = 4;  ///< an empty file in memory (memfd) for t
 class SealedMemory {
   public:
     /// Seals the file's size and content, then maps it. Throws DamagedPacket when somebody can still write to
-    /// it, or it is larger than that.
+    /// it, it has holes, or is larger than that.
     SealedMemory(int descriptor, std::int64_t mostBytes);
     ~SealedMemory();
     SealedMemory(const SealedMemory&) = delete;

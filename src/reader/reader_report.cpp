@@ -26,19 +26,6 @@ Number parseNumber(const std::string& word) {
 
 }  // namespace
 
-std::string messageLine(std::string text) {
-    if (text.size() > kLongestMessageBytes) {
-        const auto isInCharacter = [&](std::size_t at) { return (text[at] & 0xc0) == 0x80; };
-        std::size_t front = kLongestMessageBytes / 2, back = text.size() - kLongestMessageBytes / 2 + 3;
-        while (front > 0 && isInCharacter(front)) --front;
-        while (back < text.size() && isInCharacter(back)) ++back;
-        text = text.substr(0, front) + "..." + text.substr(back);
-    }
-    for (char& c : text)
-        if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
-    return text;
-}
-
 std::vector<std::string> startWords(std::int64_t parent) {
     return {kProtocol, std::to_string(parent)};
 }
@@ -61,7 +48,7 @@ std::vector<std::string> requestWords(const ReaderRequest& request) {
                                    request.path,
                                    request.task,
                                    request.body,
-                                   request.options.folder,
+                                   request.options.namedBy,
                                    std::to_string(int(request.options.followsLinks))};
     words.insert(words.end(), request.options.otherParts.begin(), request.options.otherParts.end());
     words.insert(words.end(), request.options.fields.begin(), request.options.fields.end());
@@ -80,7 +67,7 @@ ReaderRequest parseRequest(std::span<const std::string> words) {
     request.path = words[6];
     request.task = words[7];
     request.body = words[8];
-    request.options.folder = words[9];
+    request.options.namedBy = words[9];
     request.options.followsLinks = parseNumber<int>(words[10]) != 0;
     const std::span<const std::string> rest = words.subspan(kFixedWords);
     if (parts > rest.size()) throw InputError(std::string(kByItself) + "; a part has no name");

@@ -33,12 +33,6 @@ struct ReportStart {
     std::uint64_t bytes = 0;  ///< that follow
 };
 
-/// The longest message of a reading process, in bytes: with what a program puts before it a line of 1000.
-inline constexpr std::size_t kLongestMessageBytes = 980;
-/// The text as one line of at most so many bytes, without control characters: what a file holds may be in it.
-/// A longer one loses its middle.
-std::string messageLine(std::string text);
-
 /// What the reading process needs to know.
 struct ReaderRequest {
     std::int64_t parent = 0;       ///< process that waits for the answer

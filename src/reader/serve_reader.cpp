@@ -18,6 +18,7 @@
 #include "base/child_process.h"
 #include "base/machine_memory.h"
 #include "base/sanitizers.h"
+#include "base/text.h"
 #include "base/timer.h"
 #include "files/named_file.h"
 #include "reader/confine.h"
@@ -139,7 +140,8 @@ void limitMemory([[maybe_unused]] std::int64_t memoryBytes, [[maybe_unused]] con
     memoryRanOut = before.rlim_cur <= own ? ReaderOutcome::outOfMemory : ReaderOutcome::overLimit;
     rlimit limit = before;
     limit.rlim_cur = std::min(before.rlim_cur, own);
-    if (forGood) limit.rlim_max = limit.rlim_cur;
+    const rlim_t most = forGood ? own : std::max(own, rlim_t(ownBytes + defaultMemoryBytes()));
+    limit.rlim_max = std::min(before.rlim_max, most);
     ::setrlimit(RLIMIT_AS, &limit);
 #endif
 }
@@ -151,9 +153,9 @@ bool memoryTakes(std::int64_t bytes) {
            rlim_t(bytes) <= limit.rlim_cur;
 }
 
-void handOver(Packet packet, std::int64_t memoryBytes) {
+void handOver(Packet packet, std::int64_t mostBytes) {
     const std::int64_t bytes = packet.bytes();
-    if (bytes > memoryBytes) throw std::bad_alloc();  // the parent would take it for garbage
+    if (bytes > mostBytes) throw std::bad_alloc();  // the parent would take it for garbage
     if (memoryTakes(bytes)) {
         packet.writeTo([](const void* data, std::size_t count) { writeAll(kAnswerDescriptor, data, count); });
         report(ReaderOutcome::answerInMemory, std::string());
@@ -181,7 +183,7 @@ std::vector<std::string> readableFiles(const ReaderRequest& request) {
     if (request.options.followsLinks) return {"/"};
     std::vector<std::string> files{request.path, folderOf(request.path)};
     for (const std::string& part : request.options.otherParts) files.push_back(part);
-    if (!request.options.folder.empty()) files.push_back(request.options.folder);
+    if (!request.options.namedBy.empty()) files.push_back(folderOf(request.options.namedBy));
     return files;
 }
 
@@ -194,6 +196,7 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
 #endif
     const ReaderRequest request = receiveRequest(parent);
     const bool isGiven = request.memoryBytes > 0;
+    lowerLimit(RLIMIT_FSIZE, rlim_t(std::max(request.memoryBytes, defaultMemoryBytes())));  // of the answer, too
     limitMemory(isGiven ? request.memoryBytes : limitsToLook().memoryBytes, before, false);
     const auto task = std::find_if(tasks.begin(), tasks.end(),
                                    [&](const ReaderTask& known) { return known.name == request.task; });
@@ -206,9 +209,7 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
     lowerLimit(RLIMIT_FSIZE, rlim_t(limits.memoryBytes));  // also the size of the shared memory
     Execution execution;
     execution.threads = threadsWithin(request.threads, limits.memoryBytes);
-    // The parent copies what it gets while the packet is still there.
-    const std::int64_t all = isGiven ? request.memoryBytes : readingShare(defaultMemoryBytes());
-    handOver(task->run(request, limits, execution), std::min(limits.memoryBytes, all / 2));
+    handOver(task->run(request, limits, execution), limits.memoryBytes / kHandedOverShare);
 }
 
 }  // namespace

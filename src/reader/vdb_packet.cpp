@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kFurthestIndex = 1 << 30;  // of a lattice point
 constexpr std::int64_t kTileGrain = 64;
+constexpr int kMostChannels = 1 << 16;
 
 using Words = std::array<std::uint64_t, 8>;
 
@@ -59,6 +60,11 @@ TileList listTiles(BrickStore& store) {
     listTiles(store.extension(), list.extension, list.tiles);
     listTiles(store.surface(), list.surface, list.surfaceTiles);
     return list;
+}
+
+/// What a store's table takes, whatever its bricks hold.
+std::int64_t tableBytes(std::size_t leafCount, int tileCount) {
+    return std::int64_t(leafCount) * tileCount * std::int64_t(sizeof(Tile*));
 }
 
 template <class Item>
@@ -136,8 +142,8 @@ Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes) {
         (list->extension.size() + list->surface.size()) * sizeof(TileKey) +
         (list->tiles.size() + list->surface.size()) * sizeof(Words) +
         (list->tiles.size() * std::size_t(channels) + list->surface.size()) * kTilePoints * sizeof(float));
-    const std::size_t tableBytes = store->leafCount() * std::size_t(store->tileCount()) * sizeof(Tile*);
-    if (packet.bytes() + std::int64_t(tableBytes) > mostBytes) throw std::bad_alloc();
+    if (packet.bytes() + tableBytes(store->leafCount(), store->tileCount()) > mostBytes)
+        throw std::bad_alloc();
     packet.writeArrays = [store, list, channels, flat = std::move(flat)](const PacketSink& sink) {
         give(flat, sink);
         give(list->places, sink);
@@ -159,7 +165,7 @@ Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes) {
     return packet;
 }
 
-VdbFile unpackVdb(std::span<const std::byte> bytes, const Execution& execution) {
+VdbFile unpackVdb(std::span<const std::byte> bytes, std::int64_t mostBytes, const Execution& execution) {
     static_assert(sizeof(VdbFile) == 1296,
                   "a new member of VdbFile that isn't in its metadata needs its place in the packet");
     ReceivedPacket packet(bytes);
@@ -171,6 +177,7 @@ VdbFile unpackVdb(std::span<const std::byte> bytes, const Execution& execution) 
     file.strayValues = head.get<std::int64_t>();
     file.gridProblems = head.getTexts();
     const int all = channelsOf(file.fields);
+    if (all > kMostChannels) throw DamagedPacket("it has too many fields");
     const auto channels = int(head.getCount(all, "channels"));
     if (channels != 0 && channels != all) throw DamagedPacket("it has some of its channels");
     const std::int64_t most = std::int64_t(bytes.size());
@@ -187,6 +194,9 @@ VdbFile unpackVdb(std::span<const std::byte> bytes, const Execution& execution) 
     } else if (!flat.empty()) {
         throw DamagedPacket("it has bricks of a grid");
     }
+    const int tileCount = BrickStore(file.tree.brickCells(), 0, channels).tileCount();
+    if (std::int64_t(bytes.size()) + tableBytes(file.tree.leafCount(), tileCount) > mostBytes)
+        throw DamagedPacket("it has more bricks than there is memory for");
     file.store = BrickStore(file.tree.brickCells(), file.tree.leafCount(), channels);
     const auto places = packet.array<TilePlace>(leafTiles, "tiles");
     const auto extension = packet.array<TileKey>(moreTiles, "tiles");

@@ -18,7 +18,7 @@ Packet packVdb(VdbFile file, VdbContents contents, std::int64_t mostBytes);
 
 /// The file in a packet, bit for bit; without values its store has no channels. Nothing is believed: the
 /// metadata is decoded anew, and every tile lies in a brick or where an extension may, no two in one place.
-/// Throws DamagedPacket.
-VdbFile unpackVdb(std::span<const std::byte> packet, const Execution& execution);
+/// Throws DamagedPacket, also where the file would need more memory than that.
+VdbFile unpackVdb(std::span<const std::byte> packet, std::int64_t mostBytes, const Execution& execution);
 
 }  // namespace tessera

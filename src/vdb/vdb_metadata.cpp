@@ -161,8 +161,8 @@ std::vector<OutputField> decodeFields(const std::string& text) {
     int channels = 0;
     for (const Json& entry : json) {
         OutputField field;
-        entry.at("name").get_to(field.name);
-        entry.at("source").get_to(field.sourceName);
+        field.name = plainName(entry.at("name").get<std::string>());
+        field.sourceName = plainName(entry.at("source").get<std::string>());
         entry.at("location").get_to(field.location);
         field.components = readInteger<int>(entry.at("components"), "components");
         field.firstChannel = readInteger<int>(entry.at("first_channel"), "first_channel");
@@ -311,6 +311,9 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
         metadata.time = readDouble(entry(entries, "tessera_time"), "tessera_time");
         if (!std::isfinite(*metadata.time)) damaged("tessera_time isn't finite");
     }
+    for (std::string* text : {&metadata.version, &metadata.sourceFile, &metadata.algorithm,
+                              &metadata.criterion, &metadata.target, &metadata.sampleFormat})
+        *text = plainName(*text);
     metadata.layout = readChoice(entry(entries, "tessera_layout"), "tessera_layout", kLayouts);
     metadata.upAxis = readChoice(entry(entries, "tessera_up_axis"), "tessera_up_axis", kUpAxes);
     if (const auto shift = entries.find("tessera_voxel_shift"); shift != entries.end()) {
@@ -318,6 +321,8 @@ VdbMetadata decodeMetadata(const std::map<std::string, std::string>& entries) {
         if (!(std::abs(metadata.voxelShift) <= 1)) damaged("tessera_voxel_shift is out of range");
     }
     metadata.unitScale = readDouble(entry(entries, "tessera_unit_scale"), "tessera_unit_scale");
+    if (!(metadata.unitScale > 0 && std::isfinite(metadata.unitScale)))
+        damaged("tessera_unit_scale is out of range");
     metadata.halfFloat = entry(entries, "tessera_precision") == "half";
     metadata.background = float(readDouble(entry(entries, "tessera_background"), "tessera_background"));
     const double flatLevel = readDouble(entry(entries, "tessera_flat_level"), "tessera_flat_level");

@@ -4,6 +4,8 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -120,6 +122,12 @@ const std::map<std::string, std::function<tessera::MeshFile(const std::string& p
          if (open(path.c_str(), O_RDONLY) < 0) reached += "not even the mesh ";
          if (rename(path.c_str(), (path + ".new").c_str()) == 0) reached += "the mesh's name ";
          if (kill(getppid(), 0) == 0) reached += "its parent ";
+         if (fcntl(kReportDescriptor, F_SETOWN, getppid()) == 0) reached += "its parent by a signal ";
+         if (prctl(PR_SET_PDEATHSIG, 0) == 0) reached += "a life of its own ";
+         rlimit limit{};
+         getrlimit(RLIMIT_AS, &limit);
+         limit.rlim_max += 4096;
+         if (setrlimit(RLIMIT_AS, &limit) == 0) reached += "more memory ";
          if (const pid_t child = fork(); child >= 0) {
              if (child == 0) _exit(0);
              reached += "a process of its own ";

@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "base/text.h"
 #include "files/file_digest.h"
 #include "tessera/error.h"
 #include "vdb/vdb_read.h"
@@ -16,13 +17,14 @@ namespace {
 
 const IsolatedReader kReader{TESSERA_MISBEHAVING_READER, {"read"}};
 
+constexpr std::int64_t kMostBytes = 1 << 30;
+
 std::vector<std::byte> packed(VdbFile file, VdbContents contents = VdbContents::all) {
     std::vector<std::byte> bytes;
-    packVdb(std::move(file), contents, std::int64_t(1) << 30)
-        .writeTo([&](const void* data, std::size_t count) {
-            const auto* first = static_cast<const std::byte*>(data);
-            bytes.insert(bytes.end(), first, first + count);
-        });
+    packVdb(std::move(file), contents, kMostBytes).writeTo([&](const void* data, std::size_t count) {
+        const auto* first = static_cast<const std::byte*>(data);
+        bytes.insert(bytes.end(), first, first + count);
+    });
     return bytes;
 }
 
@@ -85,16 +87,16 @@ TEST_F(IsolatedVdbTest, DamagedPacketsAreRefusedOrHarmless) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, {{0, {0, 0, 0}}, {0, {2, 0, 0}}}, 1);
     writeVdb(file("out.vdb"), kScalar, result, {}, {});
     const std::vector<std::byte> good = packed(readVdb(file("out.vdb")));
-    EXPECT_EQ(packed(unpackVdb(good, {})), good);
+    EXPECT_EQ(packed(unpackVdb(good, kMostBytes, {})), good);
     for (std::size_t size = 0; size < good.size(); size += 97)
-        EXPECT_THROW(unpackVdb(std::span(good).first(size), {}), DamagedPacket);
+        EXPECT_THROW(unpackVdb(std::span(good).first(size), kMostBytes, {}), DamagedPacket);
     int refused = 0;
     for (std::uint32_t i = 0; i < 3000; ++i) {
         std::vector<std::byte> bad = good;
         // Most bytes are values, of which any are sound.
         bad[scramble(i) % (i % 2 ? good.size() : good.size() - 4096)] ^= std::byte(1 << (i % 8));
         try {
-            packed(unpackVdb(bad, {}));
+            packed(unpackVdb(bad, kMostBytes, {}));
         } catch (const DamagedPacket&) {
             ++refused;
         }
