@@ -369,7 +369,7 @@ TEST_F(IsolatedReaderTest, WhatTheReaderPrintsGoesNowhere) {
 TEST_F(IsolatedReaderTest, TheChildInheritsNoDescriptor) {
     const int file = ::open("/dev/null", O_RDONLY);  // without O_CLOEXEC
     const int far = ::fcntl(file, F_DUPFD, 700);
-    EXPECT_EQ(messageOf<InputError>("descriptors"), "open: ");
+    EXPECT_EQ(messageOf<InputError>("descriptors"), "open:");
     ::close(far);
     ::close(file);
 }
