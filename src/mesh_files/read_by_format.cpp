@@ -119,9 +119,10 @@ std::optional<std::string> allowedFolder(const std::string& path, const ReadOpti
 }
 
 void checkParts(const std::string& path, const ReadOptions& options) {
-    if (options.followsLinks || options.folder.empty()) return;
-    checkInFolder(options.folder, options.folder, path);
-    for (const std::string& part : options.otherParts) checkInFolder(options.folder, options.folder, part);
+    if (options.followsLinks || options.namedBy.empty()) return;
+    const std::string folder = folderOf(options.namedBy);
+    checkInFolder(folder, options.namedBy, path);
+    for (const std::string& part : options.otherParts) checkInFolder(folder, options.namedBy, part);
 }
 
 MeshFile readByFormat(const std::string& path, const ReadOptions& options, const Execution& execution,
