@@ -196,7 +196,8 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
 #endif
     const ReaderRequest request = receiveRequest(parent);
     const bool isGiven = request.memoryBytes > 0;
-    lowerLimit(RLIMIT_FSIZE, rlim_t(std::max(request.memoryBytes, defaultMemoryBytes())));  // of the answer, too
+    // Of the answer, too.
+    lowerLimit(RLIMIT_FSIZE, rlim_t(std::max(request.memoryBytes, defaultMemoryBytes())));
     limitMemory(isGiven ? request.memoryBytes : limitsToLook().memoryBytes, before, false);
     const auto task = std::find_if(tasks.begin(), tasks.end(),
                                    [&](const ReaderTask& known) { return known.name == request.task; });
