@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "base/text.h"
 #include "files/name_list.h"
+#include "files/named_file.h"
 #include "mesh/mesh_quality.h"
 #include "mesh_files/join_parts.h"
 #include "mesh_files/raw_mesh.h"
@@ -357,6 +358,11 @@ std::string meshName(const std::string& path, const ReadOptions& options) {
     return others == 0
                ? path
                : path + " (and " + std::to_string(others) + (others == 1 ? " other part)" : " other parts)");
+}
+
+std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options) {
+    if (options.followsLinks) return std::nullopt;
+    return folderOf(options.namedBy.empty() ? path : options.namedBy);
 }
 
 std::string cellFieldName(const std::string& name) {

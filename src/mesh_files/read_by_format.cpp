@@ -113,11 +113,6 @@ void warnOfEmptyPart(const RawMesh& part, const std::string& path, ImportStatist
 
 }  // namespace
 
-std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options) {
-    if (options.followsLinks) return std::nullopt;
-    return folderOf(options.namedBy.empty() ? path : options.namedBy);
-}
-
 void checkParts(const std::string& path, const ReadOptions& options) {
     if (options.followsLinks || options.namedBy.empty()) return;
     const std::string folder = folderOf(options.namedBy);
