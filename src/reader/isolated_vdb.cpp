@@ -2,6 +2,7 @@
 
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -112,7 +113,9 @@ VdbFile readVdbIsolated(const IsolatedReader& reader, const std::string& path, V
     VdbFile file;
     ask(reader, path, contents == VdbContents::all ? kWhole : kWithoutValues, {}, limits, execution,
         [&](std::span<const std::byte> packet, std::int64_t mostBytes) {
-            file = unpackVdb(packet, mostBytes, execution);
+            // One file: what the other process says of its size needn't be believed.
+            const std::int64_t usual = std::max(limits.memoryBytes, limitsOfVdb(path).memoryBytes);
+            file = unpackVdb(packet, std::min(mostBytes, usual / kHandedOverShare), execution);
         });
     return file;
 }
