@@ -6,9 +6,12 @@
 #include <sys/stat.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <new>
+#include <thread>
 
+#include "base/timer.h"
 #include "reader/packet.h"
 #include "tessera/error.h"
 
@@ -21,6 +24,8 @@ constexpr const char* kTask = "that reads files";
 constexpr const char* kLargePages = "GLIBC_TUNABLES=glibc.malloc.hugetlb=1";
 constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
 
+constexpr double kSealMs = 2000;
+
 [[noreturn]] void failToOpen(const std::string& what) {
     failToStart(kTask, what, errno);
 }
@@ -28,7 +33,11 @@ constexpr int kSeals = F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL;
 }  // namespace
 
 SealedMemory::SealedMemory(int descriptor, std::int64_t mostBytes) {
-    ::fcntl(descriptor, F_ADD_SEALS, kSeals);
+    // The kernel may look through its pages just now, and then waits for only a moment.
+    for (const Timer timer; ::fcntl(descriptor, F_ADD_SEALS, kSeals) != 0 && errno == EBUSY;) {
+        if (timer.elapsedMs() > kSealMs) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
     const int seals = ::fcntl(descriptor, F_GET_SEALS);
     struct stat status {};
     if (seals < 0 || (seals & kSeals) != kSeals || ::fstat(descriptor, &status) != 0)
