@@ -5,7 +5,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "tessera/error.h"
 #include "tessera/resampler.h"
 
 namespace tessera {
@@ -48,5 +50,19 @@ ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, st
 /// @param failure what the device said.
 std::optional<ResamplerChoice> chooseInstead(const ResamplerChoice& failed, const std::string& failure,
                                              const BindOptions& options);
+
+/// work(*choice.resampler). Where OpenGL fails on the way and there is a resampler instead, that becomes the
+/// choice, and the work is done once more, from its beginning.
+template <class Work>
+auto runChosen(ResamplerChoice& choice, const BindOptions& options, const Work& work) {
+    try {
+        return work(*choice.resampler);
+    } catch (const GlError& error) {
+        std::optional<ResamplerChoice> other = chooseInstead(choice, error.what(), options);
+        if (!other) throw;
+        choice = std::move(*other);
+    }
+    return work(*choice.resampler);
+}
 
 }  // namespace tessera

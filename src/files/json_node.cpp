@@ -19,9 +19,9 @@ std::string countText(std::size_t count) {
     return count < std::size(kWords) ? kWords[count] : std::to_string(count);
 }
 
-/// The library would take the last of several keys of one name.
 constexpr std::size_t kMostBytes = 16 << 20;  // of a file: parsing takes several times that
 
+/// The library would take the last of several keys of one name.
 nlohmann::json parseOnce(const std::string& text) {
     constexpr int kDeepest = 32;
     std::vector<std::set<std::string>> keys;  // of the objects that are open

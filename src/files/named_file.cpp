@@ -16,7 +16,7 @@ void checkInFolder(const std::string& folder, const std::string& by, const std::
         std::mismatch(root.begin(), root.end(), place.begin(), place.end()).first == root.end())
         return;
     throw InputError(by + ": names " + named + ", which lies outside the folder " + folder +
-                     "; --follow-links lets files name others anywhere");
+                     kFollowLinksHint);
 }
 
 std::string folderOf(const std::string& path) {

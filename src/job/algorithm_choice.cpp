@@ -1,8 +1,5 @@
 #include "job/algorithm_choice.h"
 
-#include <optional>
-#include <utility>
-
 #include "gl/gl_platform.h"
 
 namespace tessera {
@@ -13,14 +10,6 @@ AlgorithmChoice::AlgorithmChoice(const std::string& name, const BindOptions& opt
     choice_ = chooseResampler(name, options);
     if (!choice_.reason.empty()) job.say(choice_.reason + "\n");
     warnOfDrivers(job);
-}
-
-bool AlgorithmChoice::replace(const std::string& failure) {
-    std::optional<ResamplerChoice> other = chooseInstead(choice_, failure, options_);
-    if (!other) return false;
-    choice_ = std::move(*other);
-    job_.warn(choice_.reason);
-    return true;
 }
 
 void warnOfDrivers(Job& job) {

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <string>
-#include <type_traits>
 
 #include "job/job.h"
-#include "tessera/error.h"
 #include "tessera/registry.h"
 
 namespace tessera {
@@ -23,18 +21,15 @@ class AlgorithmChoice {
     /// work(resampler), and once more from its beginning where OpenGL fails on the way and "auto" can choose
     /// another resampler. That is a warning then.
     template <class Work>
-    auto run(const Work& work) -> std::invoke_result_t<const Work&, const Resampler&> {
-        try {
-            return work(resampler());
-        } catch (const GlError& error) {
-            if (!replace(error.what())) throw;
-        }
-        return work(resampler());
+    auto run(const Work& work) {
+        const Resampler* first = choice_.resampler;
+        return runChosen(choice_, options_, [&](const Resampler& resampler) {
+            if (&resampler != first) job_.warn(choice_.reason);
+            return work(resampler);
+        });
     }
 
   private:
-    bool replace(const std::string& failure);
-
     BindOptions options_;
     Job& job_;
     ResamplerChoice choice_;

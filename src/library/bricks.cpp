@@ -54,17 +54,9 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->refine = refineOptions(mesh, parts->chosen, options);
     tryDriversFor(options.algorithm);
     ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind);
-    const auto make = [&] {
-        parts->result = makeBricks(mesh, parts->chosen.fields, *choice.resampler, parts->refine, execution);
-    };
-    try {
-        make();
-    } catch (const GlError& error) {
-        const std::optional<ResamplerChoice> other = chooseInstead(choice, error.what(), parts->refine.bind);
-        if (!other) throw;
-        choice = *other;
-        make();
-    }
+    parts->result = runChosen(choice, parts->refine.bind, [&](const Resampler& resampler) {
+        return makeBricks(mesh, parts->chosen.fields, resampler, parts->refine, execution);
+    });
     parts->resampler = choice.resampler;
     parts->options.algorithm = choice.resampler->name();
     parts->options.fields.clear();

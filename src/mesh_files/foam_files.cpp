@@ -178,8 +178,7 @@ void FoamFiles::checkDirective(const fs::path& file, std::string_view text) {
 
 void FoamFiles::checkInclude(const fs::path& file, const std::string& name) {
     if (name.find_first_of("$<\\\n") != std::string::npos || name.starts_with('~'))
-        throw InputError(file.string() + ": includes " + name +
-                         ", which can be any file; --follow-links lets files name others anywhere");
+        throw InputError(file.string() + ": includes " + name + ", which can be any file" + kFollowLinksHint);
     const fs::path included = name.starts_with('/') ? fs::path(name) : file.parent_path() / name;
     checkInFolder(*folder_, file.string(), included.string());
     if (depth_ == kDeepestInclude)

@@ -12,6 +12,7 @@
 #include <cstdint>
 
 #include "files/input_file.h"
+#include "files/named_file.h"
 #include "mesh_files/netcdf_check.h"
 #include "tessera/error.h"
 
@@ -159,15 +160,11 @@ CgnsFields listFields(const std::string& path) {
     return fields;
 }
 
-/// What of an HDF5 file reads another one; empty: nothing.
-struct Hdf5Finding {
-    std::string what;
-};
-
+/// @param data a string: what of an HDF5 file reads another one; stays empty where nothing does.
 herr_t visitLink(hid_t group, const char* name, const H5L_info_t* info, void* data) {
-    auto& found = *static_cast<Hdf5Finding*>(data);
+    auto& found = *static_cast<std::string*>(data);
     if (info->type == H5L_TYPE_EXTERNAL || info->type >= H5L_TYPE_UD_MIN) {
-        found.what = std::string("a link to another file, ") + name;
+        found = std::string("a link to another file, ") + name;
         return 1;
     }
     if (info->type != H5L_TYPE_HARD) return 0;
@@ -176,11 +173,11 @@ herr_t visitLink(hid_t group, const char* name, const H5L_info_t* info, void* da
     if (H5Iget_type(object) == H5I_DATASET) {
         const hid_t plan = H5Dget_create_plist(object);
         if (plan >= 0 && (H5Pget_external_count(plan) > 0 || H5Pget_layout(plan) == H5D_VIRTUAL))
-            found.what = std::string("values in another file, of ") + name;
+            found = std::string("values in another file, of ") + name;
         H5Pclose(plan);
     }
     H5Oclose(object);
-    return found.what.empty() ? 0 : 1;
+    return found.empty() ? 0 : 1;
 }
 
 /// Links of the older kind of CGNS files, and names of files in those of HDF5.
@@ -204,7 +201,7 @@ std::string findCgnsLink(int file, double node, int depth) {
 }
 
 [[noreturn]] void refuseLink(const std::string& path, const std::string& what) {
-    throw InputError(path + ": holds " + what + "; --follow-links lets files name others anywhere");
+    throw InputError(path + ": holds " + what + kFollowLinksHint);
 }
 
 }  // namespace
@@ -215,10 +212,10 @@ void refuseLinks(const std::string& path) {
         H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
         const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
         if (file < 0) return;  // the reader will say why
-        Hdf5Finding found;
+        std::string found;
         H5Lvisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, visitLink, &found);
         H5Fclose(file);
-        if (!found.what.empty()) refuseLink(path, found.what);
+        if (!found.empty()) refuseLink(path, found);
         return;
     }
     int file = 0;

@@ -52,7 +52,7 @@ struct ReadOptions {
 /// The folder in which a file and those that it names have to lie; none where it may be any.
 std::optional<std::string> allowedFolder(const std::string& path, const ReadOptions& options);
 /// A file that the user named lies where it wants to; one that a .pvd file names doesn't. Throws InputError
-/// for one outside `options.folder`.
+/// for one outside the folder of `options.namedBy`.
 void checkParts(const std::string& path, const ReadOptions& options);
 
 struct MeshFile {
