@@ -119,7 +119,10 @@ int main(int argc, char** argv) {
     try {
         if (argc > 1 && std::string(argv[1]) == kTryWindowCommand)
             return tessera::serveTrial(std::vector<std::string>(argv + 2, argv + argc),
-                                       [](const std::string&) { tessera::tryWindow(); });
+                                       [](const std::string&) {
+                                           tessera::tryWindow();
+                                           return std::string("a window");
+                                       });
         return view(argc, argv);
     } catch (const tessera::InputError& error) {
         printError(error.what());

@@ -70,14 +70,17 @@ Session::Session(const CommonOptions& options, const std::string& output)
         printWarning(text);
     };
     const std::string quick = quickReaderBeside(program);
-    tryGlFirst(
-        {quick.empty() ? program : quick, {kTryGlCommand}, options.maxDriverSeconds, &interruptFlag()});
     const ReaderArguments& reader = options.reader;
     checkReaderOptions(reader);
     job.followsLinks = reader.followsLinks;
     if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quick};
     if (!reader.maxMemory.empty())
         job.readerLimits.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
+    tryGlFirst({quick.empty() ? program : quick,
+                {kTryGlCommand},
+                options.maxDriverSeconds,
+                &interruptFlag(),
+                job.readerLimits.memoryBytes});
     if (!reader.maxSeconds) return;
     job.readerLimits.seconds = *reader.maxSeconds;
     if (!std::isfinite(*reader.maxSeconds) || *reader.maxSeconds <= 0)

@@ -16,24 +16,30 @@ namespace {
 
 constexpr std::array kPlatforms{GlPlatform::eglDevice, GlPlatform::eglSurfaceless, GlPlatform::osmesa};
 
-/// What came of creating a context.
+/// What a trial, or creating a context, found.
 struct Probe {
     std::string reason;
     bool isFault = false;
+    bool isSoftware = false;
+};
+
+/// What creating a context told; a reason, where it failed.
+struct OpenedDevice {
+    std::string reason;
     GlDeviceInfo info;
 };
 
-Probe runProbe(GlPlatform platform) {
-    Probe probe;
+OpenedDevice openDevice(GlPlatform platform) {
+    OpenedDevice device;
     // On a thread of its own: the caller may have a context current.
     std::thread([&] {
         try {
-            probe.info = GlContext(platform).info();
+            device.info = GlContext(platform).info();
         } catch (const std::exception& error) {
-            probe.reason = error.what();
+            device.reason = error.what();
         }
     }).join();
-    return probe;
+    return device;
 }
 
 /// What is known of the platforms in this process.
@@ -54,9 +60,19 @@ class Probes {
         if (trial_ && !unknown.empty()) results = tryGl(*trial_, unknown);
         for (std::size_t i = 0; i < unknown.size(); ++i) {
             GlTrialResult& result = results[i];
-            slot(unknown[i]) = result.reason.empty() ? runProbe(unknown[i])
-                                                     : Probe{std::move(result.reason), result.isFault, {}};
+            if (result.reason.empty() && result.found.empty()) {
+                const OpenedDevice& device = opened(unknown[i]);
+                slot(unknown[i]) = {device.reason, false, device.info.isSoftware};
+            } else {
+                slot(unknown[i]) = {std::move(result.reason), result.isFault, result.found == kSoftwareFound};
+            }
         }
+    }
+
+    /// Opens a device that is there in this process; only the first call for a platform takes time.
+    const OpenedDevice& open(GlPlatform platform) {
+        const std::lock_guard lock(mutex_);
+        return opened(platform);
     }
 
     /// What was found; it doesn't change any more. Null before.
@@ -69,9 +85,16 @@ class Probes {
   private:
     std::optional<Probe>& slot(GlPlatform platform) { return slots_[static_cast<std::size_t>(platform)]; }
 
+    const OpenedDevice& opened(GlPlatform platform) {
+        std::optional<OpenedDevice>& device = opened_[static_cast<std::size_t>(platform)];
+        if (!device) device = openDevice(platform);
+        return *device;
+    }
+
     std::mutex mutex_;
     std::optional<GlTrial> trial_;
     std::array<std::optional<Probe>, kPlatforms.size()> slots_;
+    std::array<std::optional<OpenedDevice>, kPlatforms.size()> opened_;
 };
 
 Probes& probes() {
@@ -101,6 +124,10 @@ std::string reasonsOf(bool (*isTold)(const Probe&)) {
     std::string text;
     for (const auto& [names, reason] : named) text += (text.empty() ? "" : "; ") + names + ": " + reason;
     return text;
+}
+
+void throwReason(GlPlatform platform, const std::string& reason) {
+    if (!reason.empty()) throw GlError("no OpenGL from " + std::string(nameOf(platform)) + ": " + reason);
 }
 
 }  // namespace
@@ -143,11 +170,19 @@ std::string glFaults() {
     return reasons.empty() ? reasons : "no OpenGL from " + reasons;
 }
 
+void throwIfUnavailable(GlPlatform platform) {
+    throwReason(platform, unavailableReason(platform));
+}
+
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform) {
-    const Probe& probe = probeOf(platform);
-    if (!probe.reason.empty())
-        throw GlError("no OpenGL from " + std::string(nameOf(platform)) + ": " + probe.reason);
-    return probe.info;
+    throwIfUnavailable(platform);
+    const OpenedDevice& device = probes().open(platform);
+    throwReason(platform, device.reason);
+    return device.info;
+}
+
+bool isSoftwareGl(GlPlatform platform) {
+    return probeOf(platform).isSoftware;
 }
 
 const std::vector<GlPlatform>& availableGlPlatforms() {
@@ -155,7 +190,7 @@ const std::vector<GlPlatform>& availableGlPlatforms() {
         probes().probe(kPlatforms);
         const auto isThere = [](GlPlatform platform) { return unavailableReason(platform).empty(); };
         const bool hasDevice = isThere(GlPlatform::eglDevice);
-        const bool isSoftwareDevice = hasDevice && glDeviceInfo(GlPlatform::eglDevice).isSoftware;
+        const bool isSoftwareDevice = hasDevice && isSoftwareGl(GlPlatform::eglDevice);
         std::vector<GlPlatform> found;
         if (hasDevice && !isSoftwareDevice) found.push_back(GlPlatform::eglDevice);
         for (const GlPlatform platform : {GlPlatform::eglSurfaceless, GlPlatform::osmesa})
@@ -167,7 +202,10 @@ const std::vector<GlPlatform>& availableGlPlatforms() {
 }
 
 GlPlatform chooseGlPlatform(std::optional<GlPlatform> wanted) {
-    if (wanted) return glDeviceInfo(*wanted).platform;
+    if (wanted) {
+        throwIfUnavailable(*wanted);
+        return *wanted;
+    }
     if (!availableGlPlatforms().empty()) return availableGlPlatforms().front();
     throw GlError(noGlReason());
 }

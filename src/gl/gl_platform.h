@@ -24,7 +24,7 @@ GlPlatform parseGlPlatform(std::string_view name);
 void tryGlFirst(GlTrial trial);
 
 /// Why no OpenGL 4.5 core context can be had from this platform, in one sentence; empty when it can. Found
-/// out by creating one, once a process, after the trial where one is set. May be called from any thread, and
+/// out once a process, by the trial, or where none is set by creating one. May be called from any thread, and
 /// leaves the caller's context alone. @throws Cancelled as the trial does.
 const std::string& unavailableReason(GlPlatform platform);
 
@@ -34,7 +34,13 @@ std::string noGlReason();
 /// Tries none.
 std::string glFaults();
 
-/// The device that an available platform gives.
+/// @throws GlError with the reason when the platform is not available.
+void throwIfUnavailable(GlPlatform platform);
+
+/// The processor emulates the device of an available platform.
+bool isSoftwareGl(GlPlatform platform);
+
+/// The device that an available platform gives. Opens it in this process.
 /// @throws GlError with the reason when it is not available.
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform);
 

@@ -27,9 +27,11 @@ namespace {
 
 constexpr const char* kTask = "that tries OpenGL";
 constexpr int kReasonDescriptor = 3;  // of the child: a pipe
-constexpr std::string_view kGreeting = "trial\n", kWorks = "it works";
+constexpr std::string_view kGreeting = "trial\n";
 constexpr std::size_t kLongestReason = 512;  // a pipe takes that and the greeting without a reader
 constexpr int kExitUnavailable = 3;
+constexpr double kLeastSeconds = 2;  // of a driver that is tried behind another
+constexpr std::int64_t kAtOnceBytes = std::int64_t(1) << 30;
 constexpr double kTickMs = 2;
 
 const ShaderText kTriangleVert{"trial.vert.glsl", R"(
@@ -94,7 +96,8 @@ void drawTexels(GlContext& context) {
 /// A process under trial.
 class Trial {
   public:
-    Trial(const GlTrial& trial, const std::string& word) : seconds_(trial.seconds) {
+    /// @param endMs of tryDrivers' time, when the driver is given up.
+    Trial(const GlTrial& trial, const std::string& word, double endMs) : trial_(trial), endMs_(endMs) {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) failToStart(kTask, "pipe", errno);
         reason_ = Descriptor(ends[0]);
@@ -109,9 +112,9 @@ class Trial {
     std::optional<GlTrialResult> result(double spentMs) {
         const std::optional<ProcessEnd> end = child_->reap();
         if (end) return resultOf(*end);
-        if (spentMs < seconds_ * 1e3) return std::nullopt;
+        if (spentMs < endMs_) return std::nullopt;
         child_.reset();
-        return GlTrialResult{"the driver didn't answer within " + shortNumber(seconds_) + " s", true};
+        return GlTrialResult{"the driver didn't answer within " + shortNumber(trial_.seconds) + " s", true};
     }
 
   private:
@@ -122,12 +125,13 @@ class Trial {
         // Started was something else, which no driver's code has run in.
         if (!text.starts_with(kGreeting)) return {};
         text.remove_prefix(kGreeting.size());
-        if (end.exitCode == 0 && text == kWorks) return {};
+        if (end.exitCode == 0 && !text.empty()) return {{}, false, std::string(text)};
         if (end.exitCode == kExitUnavailable && !text.empty()) return {std::string(text), false};
         return {"the driver " + (end.bySignal ? end.words : "ended the process that tried it"), true};
     }
 
-    double seconds_;
+    const GlTrial& trial_;
+    double endMs_;
     Descriptor reason_;
     std::optional<ChildProcess> child_;
 };
@@ -142,26 +146,30 @@ void write(std::string_view text) {
 std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words) {
     std::vector<GlTrialResult> results(words.size());
     std::vector<std::optional<Trial>> trials(words.size());
-    for (std::size_t i = 0; i < words.size(); ++i) {
-        try {
-            trials[i].emplace(trial, words[i]);
-        } catch (const IoError& error) {
-            results[i].reason = error.what();
-        }
-    }
+    const bool isAtOnce = trial.maxMemoryBytes == 0 || trial.maxMemoryBytes >= kAtOnceBytes;
+    std::size_t started = 0;
     double spentMs = 0;
     Timer timer;
     while (true) {
-        bool isDone = true;
-        for (std::size_t i = 0; i < words.size(); ++i) {
+        std::size_t running = 0;
+        for (std::size_t i = 0; i < started; ++i) {
             if (!trials[i]) continue;
             if (std::optional<GlTrialResult> result = trials[i]->result(spentMs)) {
                 results[i] = std::move(*result);
                 trials[i].reset();
             }
-            isDone = isDone && !trials[i];
+            running += trials[i].has_value();
         }
-        if (isDone) return results;
+        for (; started < words.size() && (running == 0 || isAtOnce); ++started) {
+            const double leastMs = started == 0 ? 0 : spentMs + kLeastSeconds * 1e3;
+            try {
+                trials[started].emplace(trial, words[started], std::max(trial.seconds * 1e3, leastMs));
+                ++running;
+            } catch (const IoError& error) {
+                results[started].reason = error.what();
+            }
+        }
+        if (running == 0) return results;
         if (trial.cancel && trial.cancel->load()) throw Cancelled();
         std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(kTickMs));
         // Time in which this process didn't run, stopped by Ctrl-Z say, isn't the driver's.
@@ -169,7 +177,8 @@ std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std:
     }
 }
 
-int serveTrial(std::span<const std::string> arguments, const std::function<void(const std::string&)>& use) {
+int serveTrial(std::span<const std::string> arguments,
+               const std::function<std::string(const std::string&)>& use) {
     std::int64_t parent = 0;
     const std::string number = arguments.size() == 2 ? arguments[1] : "";
     const auto parsed = std::from_chars(number.data(), number.data() + number.size(), parent);
@@ -178,8 +187,7 @@ int serveTrial(std::span<const std::string> arguments, const std::function<void(
     settleAsChild(parent);
     write(kGreeting);
     try {
-        use(arguments[0]);
-        write(kWorks);
+        write(use(arguments[0]));
     } catch (const std::exception& error) {
         write(std::string_view(error.what()).substr(0, kLongestReason));
         return kExitUnavailable;
@@ -197,6 +205,7 @@ int serveGlTrial(std::span<const std::string> arguments) {
     return serveTrial(arguments, [](const std::string& name) {
         GlContext context(parseGlPlatform(name));
         drawTexels(context);
+        return std::string(context.info().isSoftware ? kSoftwareFound : kHardwareFound);
     });
 }
 

@@ -18,7 +18,7 @@ void warnOfDrivers(Job& job) {
 
 void checkGlTarget(const std::string& target) {
     for (const GlPlatform platform : glPlatforms())
-        if (nameOf(platform) == target) glDeviceInfo(platform);
+        if (nameOf(platform) == target) throwIfUnavailable(platform);
 }
 
 }  // namespace tessera

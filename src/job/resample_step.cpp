@@ -18,7 +18,6 @@
 #include "refine/plan_frame.h"
 #include "refine/refine.h"
 #include "schedule/schedule_bricks.h"
-#include "tessera/registry.h"
 
 namespace tessera {
 
@@ -120,21 +119,12 @@ void judgeFile(const TetMesh& mesh, const StepPlan& plan, BrickResult& bricks) {
         "the samples keep to the bound, but the file, which is coarser or less precise, has " + exceeded;
 }
 
-/// What drivers keep that were asked what they can do, and sample nothing: measured, two thirds.
-std::int64_t openedDriverBytes() {
-    std::int64_t bytes = 0;
-    for (const Resampler* resampler : resamplers())
-        bytes = std::max(bytes, resampler->workMemory(1).fixed / 3 * 2);
-    return bytes;
-}
-
 }  // namespace
 
 StepPlan planStep(const TetMesh& mesh, const ResampleRequest& request, const Resampler& resampler) {
     StepPlan plan{selectFields(mesh, request.fields), {}, request.refine, request.shape};
     plan.namesText = nameFields(plan.selection.outputs, request.fields, request.program);
-    WorkMemory work = resampler.workMemory(plan.selection.channels);
-    if (request.algorithm == "auto") work.fixed = std::max(work.fixed, openedDriverBytes());
+    const WorkMemory work = resampler.workMemory(plan.selection.channels);
     const MemoryShares shares =
         shareMemory(request.refine.maxMemoryBytes, mesh, plan.shape.layout == VdbLayout::flat, work);
     plan.refine.bind.workBytes = shares.workBytes;

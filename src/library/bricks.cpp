@@ -52,7 +52,7 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->options = options;
     parts->chosen = chooseFields(mesh, options.fields);
     parts->refine = refineOptions(mesh, parts->chosen, options);
-    tryDriversFor(options.algorithm);
+    tryDriversFor(options.algorithm, options.maxMemoryBytes);
     ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind);
     parts->result = runChosen(choice, parts->refine.bind, [&](const Resampler& resampler) {
         return makeBricks(mesh, parts->chosen.fields, resampler, parts->refine, execution);

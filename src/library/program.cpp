@@ -47,12 +47,14 @@ std::string findProgram() {
     return isProgram(knownProgram()) ? knownProgram() : programInPath();
 }
 
-void tryDriversFor(const std::string& algorithm) {
+void tryDriversFor(const std::string& algorithm, std::int64_t maxMemoryBytes) {
     if (algorithm == "software") return;
     const std::string program = findProgram();
     if (program.empty()) return;
     const std::string quick = quickReaderBeside(program);
-    tryGlFirst({quick.empty() ? program : quick, {kTryGlCommand}});
+    tryGlFirst({.executable = quick.empty() ? program : quick,
+                .arguments = {kTryGlCommand},
+                .maxMemoryBytes = maxMemoryBytes});
 }
 
 }  // namespace tessera

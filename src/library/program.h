@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace tessera {
@@ -10,6 +11,7 @@ bool isProgram(const std::string& path);
 std::string findProgram();
 
 /// Has that program, where there is one, try drivers before an algorithm uses them in this process.
-void tryDriversFor(const std::string& algorithm);
+/// @param maxMemoryBytes see GlTrial.
+void tryDriversFor(const std::string& algorithm, std::int64_t maxMemoryBytes = 0);
 
 }  // namespace tessera

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <filesystem>
 
+#include "base/timer.h"
 #include "gl/gl_platform.h"
 #include "gl_test_tools.h"
 #include "tessera/error.h"
@@ -41,7 +42,7 @@ class GlTrials : public testing::Test {
     }
 
     /// Long enough for sound drivers on a busy machine.
-    GlTrial trial{beside("gl_trial_program"), {}, 300, nullptr};
+    GlTrial trial{.executable = beside("gl_trial_program"), .arguments = {}, .seconds = 300};
 };
 
 TEST_F(GlTrials, SoundDriversPass) {
@@ -49,6 +50,7 @@ TEST_F(GlTrials, SoundDriversPass) {
          tryGl(trial, std::array{GlPlatform::eglSurfaceless, GlPlatform::osmesa})) {
         EXPECT_EQ(result.reason, "");
         EXPECT_FALSE(result.isFault);
+        EXPECT_TRUE(result.found == kSoftwareFound || result.found == kHardwareFound) << result.found;
     }
     breakDrivers("no way");
     EXPECT_EQ(tryGl(trial, std::array{GlPlatform::osmesa})[0].reason, "");
@@ -85,6 +87,17 @@ TEST_F(GlTrials, AStallEndsAfterTheTimeGiven) {
         EXPECT_EQ(result.reason, "the driver didn't answer within 0.25 s");
         EXPECT_TRUE(result.isFault);
     }
+}
+
+TEST_F(GlTrials, InLittleMemoryOneIsTriedAfterAnother) {
+    trial.maxMemoryBytes = 200 << 20;
+    for (const GlTrialResult& result : tryGl(trial, glPlatforms())) EXPECT_FALSE(result.isFault);
+    breakDrivers("stall");
+    trial.seconds = 0.25;
+    const Timer timer;
+    for (const GlTrialResult& result : tryGl(trial, kEgl))
+        EXPECT_EQ(result.reason, "the driver didn't answer within 0.25 s");
+    EXPECT_GE(timer.elapsedMs(), 2000) << "both at once";
 }
 
 TEST_F(GlTrials, AStallGivesWayToCancellation) {
