@@ -103,12 +103,25 @@ void checkElements(const NetcdfFile& file, int variable, const std::string& bloc
     }
 }
 
+/// VTK's reader looks blocks up by their numbers.
+void checkBlockNumbers(const NetcdfFile& file, int variable) {
+    const std::int64_t blocks = file.length("num_el_blk");
+    if (file.lengths(variable) != std::vector{blocks})
+        file.fail("the list of element blocks hasn't the length that is declared");
+    std::vector<long long> numbers(std::size_t(std::max<std::int64_t>(0, blocks)));
+    if (const int error = nc_get_var_longlong(file.id(), variable, numbers.data()); error != NC_NOERR)
+        file.fail(std::string("the list of element blocks can't be read: ") + nc_strerror(error));
+    std::sort(numbers.begin(), numbers.end());
+    const auto twice = std::adjacent_find(numbers.begin(), numbers.end());
+    if (twice != numbers.end())
+        file.fail("two of its element blocks have the number " + std::to_string(*twice));
+}
+
 void checkElements(const NetcdfFile& file) {
     const std::int64_t nodes = std::max<std::int64_t>(0, file.length("num_nodes"));
     for (int variable = 0; variable < file.variableCount(); ++variable) {
-        const std::string name = file.nameOf(variable), blockIds = "eb_prop1", table = "connect";
-        if (name == blockIds && file.lengths(variable) != std::vector{file.length("num_el_blk")})
-            file.fail("the list of element blocks hasn't the length that is declared");
+        const std::string name = file.nameOf(variable), table = "connect";
+        if (name == "eb_prop1") checkBlockNumbers(file, variable);
         if (!name.starts_with(table) || name.size() == table.size()) continue;
         const std::string block = name.substr(table.size());
         if (block.find_first_not_of("0123456789") == std::string::npos)

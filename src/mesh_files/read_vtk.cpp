@@ -256,6 +256,10 @@ RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& op
         throw TooLargeError(path + ": damaged or too large: reading it asked for more memory than there is");
     } catch (const std::length_error&) {
         throw InputError(path + ": damaged: it declares an impossible size");
+    } catch (const InternalError&) {
+        throw;
+    } catch (const std::logic_error&) {  // VTK's readers take for granted that names are there
+        throw InputError(path + ": damaged: it lacks what a file of its format holds");
     }
 }
 

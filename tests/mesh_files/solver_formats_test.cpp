@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -147,6 +148,19 @@ TEST(SolverFormats, ExodusRefusesNodesThatAreNotThere) {
         EXPECT_PRED2(holds, refusal(path),
                      "element 2 of block 2 (both counted from 1) names node " + std::to_string(node));
     }
+}
+
+TEST(SolverFormats, ExodusRefusesBlocksOfOneNumber) {
+    const TemporaryFolder folder;
+    const std::string path = folder.file("box.ex2");
+    writeExodus(path, EX_CLOBBER);
+    std::ifstream in(path, std::ios::binary);
+    std::string bytes((std::istreambuf_iterator<char>(in)), {});
+    const std::size_t numbers = bytes.find(std::string("\0\0\0\7\0\0\0\11", 8));
+    ASSERT_NE(numbers, std::string::npos);
+    bytes.replace(numbers, 8, 8, '\0');
+    std::ofstream(path, std::ios::binary) << bytes;
+    EXPECT_PRED2(holds, refusal(path), "two of its element blocks have the number 0");
 }
 
 TEST(SolverFormats, CgnsUnstructured) {
