@@ -25,10 +25,6 @@ Vec3i ancestorIndex(const Vec3i& index, int levels) {
     return {index.x >> levels, index.y >> levels, index.z >> levels};
 }
 
-std::size_t childOf(const Vec3i& index) {
-    return std::size_t((index.x & 1) | (index.y & 1) << 1 | (index.z & 1) << 2);
-}
-
 }  // namespace
 
 BrickTree::BrickTree(const Vec3d& originWorld, double spacingWorld, int brickCells,
@@ -62,18 +58,9 @@ void BrickTree::layOutRoots() {
         rootSize_ = Vec3i(0);
 }
 
-std::int32_t BrickTree::rootEntry(const Vec3i& index) const {
-    if (denseRoots_.empty()) {
-        const auto found = sparseRoots_.find(BrickKey{0, index});
-        return found == sparseRoots_.end() ? kAbsent : found->second;
-    }
-    // Unsigned comparison rejects what lies below the grid too.
-    const std::uint32_t x = std::uint32_t(index.x) - std::uint32_t(rootMin_.x);
-    const std::uint32_t y = std::uint32_t(index.y) - std::uint32_t(rootMin_.y);
-    const std::uint32_t z = std::uint32_t(index.z) - std::uint32_t(rootMin_.z);
-    if (x >= std::uint32_t(rootSize_.x) || y >= std::uint32_t(rootSize_.y) || z >= std::uint32_t(rootSize_.z))
-        return kAbsent;
-    return denseRoots_[(std::size_t(z) * std::size_t(rootSize_.y) + y) * std::size_t(rootSize_.x) + x];
+std::int32_t BrickTree::sparseRootEntry(const Vec3i& index) const {
+    const auto found = sparseRoots_.find(BrickKey{0, index});
+    return found == sparseRoots_.end() ? kAbsent : found->second;
 }
 
 std::int32_t& BrickTree::rootSlot(const Vec3i& index) {
@@ -186,29 +173,12 @@ void BrickTree::findLeavesIn(const Box3d& index0, std::vector<std::size_t>& leav
                 findIn(rootEntry({x, y, z}), level, {x, y, z}, index0, leaves);
 }
 
-std::int64_t BrickTree::findLeafAt(const Vec3d& index0) const {
-    constexpr double kLimit = 2147483647.0;
-    if (!(std::abs(index0.x) < kLimit && std::abs(index0.y) < kLimit && std::abs(index0.z) < kLimit))
-        return -1;
-    return findLeafAt(0, {floorToInt(index0.x), floorToInt(index0.y), floorToInt(index0.z)});
-}
-
 std::int64_t BrickTree::findLeafAt(int level, const Vec3i& p) const {
     if (levelCount_ == 0) return -1;
     // 64 bits: a coarse lattice's far corner, counted in points of level 0, may pass 2^31.
     const std::int64_t x = std::int64_t(p.x) << level, y = std::int64_t(p.y) << level,
                        z = std::int64_t(p.z) << level;
-    const int shift = std::countr_zero(unsigned(brickCells_));
-    const auto brickAt = [&](int l) {
-        return Vec3i(int(x >> (shift + l)), int(y >> (shift + l)), int(z >> (shift + l)));
-    };
-    int l = levelCount_ - 1;
-    std::int32_t entry = rootEntry(brickAt(l));
-    while (entry < kAbsent) {
-        --l;
-        entry = inner_[innerPosition(entry)][childOf(brickAt(l))];
-    }
-    return entry >= 0 ? entry : -1;
+    return findLeafBy([&](int shift) { return Vec3i(int(x >> shift), int(y >> shift), int(z >> shift)); });
 }
 
 }  // namespace tessera

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <tuple>
@@ -66,7 +69,13 @@ class BrickTree {
     /// True when `key` itself isn't a leaf but leaves lie inside it.
     bool isRefined(const BrickKey& key) const;
     /// The leaf whose half-open box of cells contains the place, given in index space of level 0, or -1.
-    std::int64_t findLeafAt(const Vec3d& index0) const;
+    std::int64_t findLeafAt(const Vec3d& index0) const {
+        constexpr double kLimit = 2147483647.0;
+        if (!(std::abs(index0.x) < kLimit && std::abs(index0.y) < kLimit && std::abs(index0.z) < kLimit))
+            return -1;
+        const Vec3i p{floorToInt(index0.x), floorToInt(index0.y), floorToInt(index0.z)};
+        return findLeafBy([&](int shift) { return p >> std::min(shift, 31); });
+    }
     /// Appends the leaves whose half-open boxes of cells meet a closed box given in index space of level 0.
     void findLeavesIn(const Box3d& index0, std::vector<std::size_t>& leaves) const;
     /// The leaf, of any level, whose half-open box contains lattice point `p` of `level`, or -1.
@@ -84,7 +93,30 @@ class BrickTree {
                 std::vector<std::size_t>& leaves) const;
     void layOutRoots();
     void insert(std::int32_t leaf);
-    std::int32_t rootEntry(const Vec3i& index) const;
+    std::int32_t rootEntry(const Vec3i& index) const {
+        if (denseRoots_.empty()) return sparseRootEntry(index);
+        // Unsigned comparison rejects what lies below the grid too.
+        const std::uint32_t x = std::uint32_t(index.x) - std::uint32_t(rootMin_.x);
+        const std::uint32_t y = std::uint32_t(index.y) - std::uint32_t(rootMin_.y);
+        const std::uint32_t z = std::uint32_t(index.z) - std::uint32_t(rootMin_.z);
+        if (x >= std::uint32_t(rootSize_.x) || y >= std::uint32_t(rootSize_.y) ||
+            z >= std::uint32_t(rootSize_.z))
+            return kAbsent;
+        return denseRoots_[(std::size_t(z) * std::size_t(rootSize_.y) + y) * std::size_t(rootSize_.x) + x];
+    }
+    std::int32_t sparseRootEntry(const Vec3i& index) const;
+    static std::size_t childOf(const Vec3i& index) {
+        return std::size_t((index.x & 1) | (index.y & 1) << 1 | (index.z & 1) << 2);
+    }
+    /// @param shifted a point of level 0, its coordinates shifted to the right by so many bits.
+    template <class Shifted>
+    std::int64_t findLeafBy(const Shifted& shifted) const {
+        if (levelCount_ == 0) return -1;
+        int shift = std::countr_zero(unsigned(brickCells_)) + levelCount_ - 1;
+        std::int32_t entry = rootEntry(shifted(shift));
+        while (entry < kAbsent) entry = inner_[innerPosition(entry)][childOf(shifted(--shift))];
+        return entry;
+    }
     std::int32_t& rootSlot(const Vec3i& index);
     /// The entry at `key`, or the leaf above it; `level` receives the level of what was found.
     std::int32_t descend(const BrickKey& key, int& level) const;

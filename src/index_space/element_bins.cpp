@@ -57,25 +57,33 @@ class RegionGrid {
     template <class Found>
     void forEachRegion(const Vec3i& low, const Vec3i& high, const Found& found) const {
         const Vec3i a = cellOf(low), b = cellOf(high);
+        // Most boxes are small: most lie in one cell, and most cells in one region.
+        if (a == b) return forEachRegionOf(index(a), low, high, found);
         for (int z = a.z; z <= b.z; ++z)
             for (int y = a.y; y <= b.y; ++y)
-                for (int x = a.x; x <= b.x; ++x) {
-                    const std::size_t cell = index({x, y, z});
-                    for (std::int32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-                        const std::int32_t region = list_[std::size_t(i)];
-                        const IndexBox& box = regions_[std::size_t(region)];
-                        const Vec3i corner = glm::max(low, box.min);
-                        if (high.x < box.min.x || high.y < box.min.y || high.z < box.min.z ||
-                            low.x >= box.max.x || low.y >= box.max.y || low.z >= box.max.z)
-                            continue;
+                for (int x = a.x; x <= b.x; ++x)
+                    forEachRegionOf(index({x, y, z}), low, high, [&](std::int32_t region) {
                         // A region that shares several cells with the box counts in the first only.
+                        const Vec3i corner = glm::max(low, regions_[std::size_t(region)].min);
                         if (cellOf(corner) == Vec3i{x, y, z}) found(region);
-                    }
-                }
+                    });
     }
 
   private:
     static constexpr int kMostCells = 128;
+
+    // The same for the regions of one cell.
+    template <class Found>
+    void forEachRegionOf(std::size_t cell, const Vec3i& low, const Vec3i& high, const Found& found) const {
+        for (std::int32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
+            const std::int32_t region = list_[std::size_t(i)];
+            const IndexBox& box = regions_[std::size_t(region)];
+            // One branch for six comparisons.
+            const bool isBeside = (high.x < box.min.x) | (high.y < box.min.y) | (high.z < box.min.z) |
+                                  (low.x >= box.max.x) | (low.y >= box.max.y) | (low.z >= box.max.z);
+            if (!isBeside) found(region);
+        }
+    }
 
     Vec3i cellOf(const Vec3i& p) const {
         return {(p.x - bounds_.min.x) >> shift_.x, (p.y - bounds_.min.y) >> shift_.y,
@@ -217,7 +225,7 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
         }
         bins.first[r + 1] = next;
     }
-    bins.elements.resize(std::size_t(bins.first.back()));
+    resizeLarge(bins.elements, std::size_t(bins.first.back()));
     parallelFor(execution, std::int64_t(chunks), [&](std::int64_t c) {
         std::vector<std::int32_t>& place = counts[std::size_t(c)];
         for (const Pair& pair : pairs[std::size_t(c)]) {

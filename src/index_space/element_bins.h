@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "base/large_pages.h"
 #include "index_space/node_frame.h"
 #include "tessera/execution.h"
 #include "tessera/lattice.h"
@@ -14,7 +15,7 @@ namespace tessera {
 /// For every region the elements whose bounding boxes hold one of its lattice points, ascending.
 struct ElementBins {
     std::vector<std::int64_t> first;  ///< regions + 1 offsets into `elements`
-    std::vector<std::int32_t> elements;
+    UninitializedVector<std::int32_t> elements;
 
     std::span<const std::int32_t> of(std::size_t region) const {
         return {elements.data() + first[region], std::size_t(first[region + 1] - first[region])};

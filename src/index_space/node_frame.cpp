@@ -86,8 +86,9 @@ NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Executio
                     node.part[a] = double(index[a] - whole);
                 }
             }
-            for (int a = 0; a < 3; ++a)
-                frame.rough[std::size_t(n)].index[a] = float(node.whole[a] + node.part[a]);
+            NodeFrame::Rough& rough = frame.rough[std::size_t(n)];
+            for (int a = 0; a < 3; ++a) rough.index[a] = float(node.whole[a] + node.part[a]);
+            rough.index[3] = 0;
         }
     });
     return frame;

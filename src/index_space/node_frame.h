@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "base/large_pages.h"
 #include "tessera/execution.h"
 #include "tessera/lattice.h"
 #include "tessera/mesh.h"
@@ -25,11 +26,11 @@ struct NodeFrame {
         double part[3];  ///< absolute error at most 4 * 2^-53
     };
     Lattice lattice;
-    std::vector<Node> nodes;
+    UninitializedVector<Node> nodes;
     struct alignas(16) Rough {
         float index[4];  ///< rounded index coordinates and 0
     };
-    std::vector<Rough> rough;  ///< for culling only
+    UninitializedVector<Rough> rough;  ///< for culling only
 };
 
 NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution);

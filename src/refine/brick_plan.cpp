@@ -265,8 +265,10 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
     const double spacing = frame.spacingWorld(depth);
     const NodeBricks nodes = nodeBricks(mesh, frame, range, marks, execution);
     const std::int64_t last = mesh.elementCount() - 1;
+    std::atomic<std::int64_t> left{std::int64_t(rangeCount(range))};  // bricks without a mark
     parallelForChunks(
         execution, mesh.elementCount(), kElementChunk, [&](std::int64_t begin, std::int64_t end) {
+            if (left.load(std::memory_order_relaxed) == 0) return;
             std::optional<ElementOverlap> element;
             for (std::int64_t e = begin; e < end; ++e) {
                 for (const std::int32_t n : mesh.tets[std::size_t(std::min(e + kPrefetchElements, last))])
@@ -288,8 +290,8 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
                                 element.emplace(elementInIndexSpace(mesh, e, frame.originWorld, spacing));
                             const DepthKey key{depth, {x, y, z}};
                             if (element->touches(brickTouchBox(key.index, frame.brickCells)) &&
-                                insideBounds(key, frame))
-                                mark.store(1, std::memory_order_relaxed);
+                                insideBounds(key, frame) && mark.exchange(1, std::memory_order_relaxed) == 0)
+                                left.fetch_sub(1, std::memory_order_relaxed);
                         }
             }
         });

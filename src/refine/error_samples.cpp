@@ -62,13 +62,6 @@ ErrorSamples::ErrorSamples(const TetMesh& mesh, std::span<const int> fields, con
         });
 }
 
-namespace {
-
-constexpr std::int32_t kNoSample = -2;
-constexpr std::int32_t kOutside = -1;
-
-}  // namespace
-
 std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0) {
     std::int64_t leaf = tree.findLeafAt(index0);
     if (leaf < 0) {
@@ -79,7 +72,7 @@ std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0) {
             if (std::abs(index0[a] - whole[a]) < 1e-6) snapped[a] = whole[a];
         leaf = tree.findLeafAt(snapped);
     }
-    return leaf < 0 ? kOutside : std::int32_t(leaf);
+    return leaf < 0 ? kOutsideLeaves : std::int32_t(leaf);
 }
 
 SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
@@ -95,7 +88,7 @@ SamplesByLeaf sortSamples(const ErrorSamples& samples, const BrickTree& tree,
                 if (!samples.exists(std::size_t(s))) continue;
                 const Vec3d place = samples.placeWorld(std::size_t(s), origin);
                 leafOf[std::size_t(s)] =
-                    bounds && !contains(*bounds, place) ? kOutside : leafOfPlace(tree, place * inverse);
+                    bounds && !contains(*bounds, place) ? kOutsideLeaves : leafOfPlace(tree, place * inverse);
             }
         });
     SamplesByLeaf sorted;

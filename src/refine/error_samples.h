@@ -42,6 +42,8 @@ class SampledMesh {
                              mesh_->points[std::size_t(tet[2])], mesh_->points[std::size_t(tet[3])],
                              originWorld);
     }
+    /// A node: centroids are summed relative to it.
+    const Vec3d& reference() const { return reference_; }
     /// Centroid of four nodes, relative to `originWorld`.
     Vec3d centroidWorld(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d,
                         const Vec3d& originWorld) const {
@@ -62,7 +64,7 @@ class SampledMesh {
     const TetMesh* mesh_;
     std::vector<SampledField> fields_;
     int channels_ = 0;
-    Vec3d reference_{0};  // a node: centroids are summed relative to it
+    Vec3d reference_{0};
 };
 
 /// |volume| from six times the volume, world units. One that underflows or cancels to 0 in double still
@@ -88,7 +90,10 @@ class ErrorSamples : public SampledMesh {
     NodeSet nodes_;
 };
 
-/// The leaf that holds a place given in index space of level 0, or -1.
+/// In place of a sample's leaf: no leaf holds it, or there is no such sample.
+inline constexpr std::int32_t kOutsideLeaves = -1, kNoSample = -2;
+
+/// The leaf that holds a place given in index space of level 0, or kOutsideLeaves.
 std::int32_t leafOfPlace(const BrickTree& tree, const Vec3d& index0);
 
 inline bool contains(const Box3d& box, const Vec3d& p) {

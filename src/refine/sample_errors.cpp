@@ -1,5 +1,6 @@
 #include "refine/sample_errors.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include "base/parallel.h"
 #include "brick/leaf_tiles.h"
 #include "mesh/geometry.h"
+#include "refine/measure_kernel.h"
 #include "refine/node_set.h"
 
 namespace tessera {
@@ -17,7 +19,7 @@ namespace {
 constexpr std::int64_t kErrorChunk = 16384;
 constexpr std::int64_t kRunChunk = 16;
 constexpr std::int64_t kPrefetch = 16;  // elements ahead: nodes are reached in no order
-constexpr std::size_t kBatch = 128;
+constexpr std::size_t kBatch = kMeasureLanes;
 constexpr double kNodeWeight = 1.0 / 20, kCentroidWeight = 4.0 / 5;
 
 // A sample whose cell isn't made of stored samples alone; its leaf's turn comes after all others.
@@ -30,67 +32,46 @@ struct Deferred {
 // What one chunk of samples comes to.
 struct Part {
     std::vector<FieldSums> sums;
+    // Of what is measured in batches, until the part is done: one a field, and one a channel.
+    std::vector<SquareSums> squares;
+    std::vector<LaneSums> integrals;
     std::vector<Deferred> deferred;
     std::int64_t inside = 0, outside = 0, fullyCovered = 0, incomplete = 0, flat = 0, inverted = 0;
 };
 
-// Some samples on their way. The corners' addresses are found for all of them before the first value is read,
-// so that the reads from memory overlap.
-struct Batch {
-    explicit Batch(int channels) : exact(std::size_t(channels) * kBatch) {}
-    std::size_t count = 0;
-    std::array<std::uint32_t, kBatch> sample;
-    std::array<Vec3d, kBatch> placeWorld;  // from the tree's origin
-    std::array<double, kBatch> volume;
+// Some samples on their way, and what belongs to them here. The corners' addresses are found for all of them
+// before the first value is read, so that the reads from memory overlap.
+struct Batch : MeasureBatch {
+    Batch(int channelCount, std::size_t fields)
+        : MeasureBatch{}, exact(std::size_t(channelCount)), errors(fields), nodeErrors(fields) {}
+
+    std::uint32_t first = 0;  // sample of the first lane
     std::array<std::int32_t, kBatch> leaf;
-    std::array<bool, kBatch> direct;
-    std::array<Vec3d, kBatch> fraction;
     std::array<std::array<const float*, 8>, kBatch> corner;
-    std::vector<double> exact;  // [channel * kBatch + position]
+    LaneFloats corners[8];                              // values of one channel
+    std::vector<LaneDoubles> exact;                     // one a channel
+    std::vector<LaneDoubles> errors;                    // one a field
+    std::vector<std::array<LaneFloats, 4>> nodeErrors;  // one a field: of elements
 };
 
-// Samples come near the last one, so its leaf is tried first, as long as that mostly succeeds.
-class LastLeaf {
-  public:
-    LastLeaf(const BrickTree& tree, const LeafTiles& tiles)
-        : tree_(tree), tiles_(tiles), inverseSpacing0_(1.0 / tree.spacingWorld(0)) {}
-    /// The leaf that holds a place, -1 when there is none; world units from the tree's origin.
-    std::int32_t find(const Vec3d& placeWorld);
-    /// That place in the leaf's index space, from its first point.
-    Vec3d local() const { return local_; }
-
-  private:
-    void locate(const Vec3d& placeWorld);
-    bool isInside() const;
-
-    const BrickTree& tree_;
-    const LeafTiles& tiles_;
-    double inverseSpacing0_;  // of level 0, 1 / world units
-    std::int32_t leaf_ = -1;
-    int credit_ = 8;
-    Vec3d local_{0};
+// From a cell's first corner to its corners: tiles of the table, and points in the tile.
+struct CornerSteps {
+    std::array<int, 8> tile, point;
 };
 
-void LastLeaf::locate(const Vec3d& placeWorld) {
-    const LeafTiles::Leaf& leaf = tiles_.leaf(std::size_t(leaf_));
-    local_ = placeWorld * leaf.inverseSpacing - leaf.firstPoint;
-}
-
-bool LastLeaf::isInside() const {
-    const double edge = tree_.brickCells();
-    return local_.x >= 0 && local_.y >= 0 && local_.z >= 0 && local_.x < edge && local_.y < edge &&
-           local_.z < edge;
-}
-
-std::int32_t LastLeaf::find(const Vec3d& placeWorld) {
-    if (leaf_ >= 0 && credit_ > 0) {
-        locate(placeWorld);
-        credit_ += isInside() ? 1 : -1;
-        if (isInside()) return leaf_;
-    }
-    leaf_ = leafOfPlace(tree_, placeWorld * inverseSpacing0_);
-    if (leaf_ >= 0) locate(placeWorld);
-    return leaf_;
+// @param edge of the table of tiles.
+std::array<CornerSteps, 8> makeCornerSteps(int edge) {
+    const std::array<int, 3> tileStep{edge * edge, edge, 1}, pointStep{64, 8, 1};
+    std::array<CornerSteps, 8> all{};
+    for (std::size_t beyond = 0; beyond < 8; ++beyond)
+        for (std::size_t c = 0; c < 8; ++c)
+            for (std::size_t a = 0; a < 3; ++a) {
+                if (!(c >> a & 1)) continue;
+                const bool isBeyond = beyond >> a & 1;
+                all[beyond].tile[c] += isBeyond ? tileStep[a] : 0;
+                all[beyond].point[c] += isBeyond ? -7 * pointStep[a] : pointStep[a];
+            }
+    return all;
 }
 
 void raise(double& slot, double value) {
@@ -110,13 +91,16 @@ class Measurement {
   private:
     std::vector<Part> measureNodes(const NodeSet& used);
     std::vector<Part> measureElements();
-    void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part);
-    void locate(Batch& batch) const;
-    bool findCorners(std::size_t leaf, const Vec3i& cell, std::array<const float*, 8>& corner) const;
+    void gatherNodes(std::int64_t begin, std::int64_t end, const NodeSet& used, Batch& batch) const;
+    void gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part) const;
+    void findCells(Batch& batch) const;
+    bool findCorners(const TileView* tiles, int offset, int beyond,
+                     std::array<const float*, 8>& corner) const;
     void measureBatch(Batch& batch, Part& part);
-    bool fieldErrors(const Batch& batch, std::size_t i, std::span<double> errors) const;
+    void keepBatch(const Batch& batch, Part& part);
     void keep(std::uint32_t sample, std::int32_t leaf, std::span<const double> errors, Part& part);
-    void addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const;
+    void addElements(const Batch& batch, Part& part) const;
+    void finish(Part& part) const;
     double centroidWeight(const SampledField& field) const { return field.isCell() ? 1 : kCentroidWeight; }
     void measureDeferred(std::vector<Part>& parts);
     void advance(std::int64_t pieces);
@@ -132,6 +116,8 @@ class Measurement {
     std::vector<double>* leafErrors_;
     std::optional<Box3d> bounds_;  // from the tree's origin
     LeafTiles tiles_;
+    std::array<CornerSteps, 8> cornerSteps_;  // by MeasureBatch::beyond
+    std::vector<float> zeros_;  // what is read where there are no corners: a tile of every channel
     std::vector<std::vector<float>> lists_;
     std::atomic<std::int64_t> done_{0};  // pieces of work, see advance
 };
@@ -147,6 +133,8 @@ Measurement::Measurement(const SampledMesh& samples, const BrickTree& tree, cons
       execution_(execution),
       leafErrors_(leafErrors),
       tiles_(tree, store, execution),
+      cornerSteps_(makeCornerSteps(tiles_.edge())),
+      zeros_(std::size_t(samples.channels()) * kTilePoints),
       lists_(samples.fields().size()) {
     for (std::vector<float>& list : lists_) {
         reserveLarge(list, samples.count());
@@ -167,82 +155,108 @@ Part Measurement::newPart() const {
     part.sums.resize(lists_.size());
     for (std::size_t f = 0; f < part.sums.size(); ++f)
         part.sums[f].integralMesh.assign(std::size_t(samples_.fields()[f].field->components), 0);
+    part.squares.resize(lists_.size());
+    part.integrals.resize(std::size_t(samples_.channels()));
     return part;
 }
 
 // Sets the corners' addresses when all eight are stored and covered.
-bool Measurement::findCorners(std::size_t leaf, const Vec3i& cell,
+bool Measurement::findCorners(const TileView* tiles, int offset, int beyond,
                               std::array<const float*, 8>& corner) const {
-    const TileView* tiles = tiles_.tiles(leaf);
-    const int n = tiles_.edge();
-    const Vec3i tile = cell >> 3, in = cell & 7;
-    if (in.x < 7 && in.y < 7 && in.z < 7) {
-        const TileView& view = tiles[(tile.x * n + tile.y) * n + tile.z];
+    const CornerSteps& steps = cornerSteps_[std::size_t(beyond)];
+    bool isFull = true;
+    for (std::size_t c = 0; c < 8; ++c) {
+        const TileView& view = tiles[steps.tile[c]];
         if (!view.values) return false;
-        const int offset = (in.x * 8 + in.y) * 8 + in.z;
-        if (view.coverage) {
-            const std::uint64_t four = 0x303ull << (offset & 63);  // (0 or 1, 0 or 1) along y and z
-            if (~(view.coverage[in.x] & view.coverage[in.x + 1]) & four) return false;
-        }
-        for (std::size_t c = 0; c < 8; ++c)
-            corner[c] = view.values + offset + (c & 1 ? 64 : 0) + (c & 2 ? 8 : 0) + (c & 4 ? 1 : 0);
-        return true;
+        isFull &= view.coverage == nullptr;
+        corner[c] = view.values + (offset + steps.point[c]);
     }
-    for (int c = 0; c < 8; ++c) {
-        const Vec3i p = cell + cornerOffset(c);
-        const TileView& view = tiles[((p.x >> 3) * n + (p.y >> 3)) * n + (p.z >> 3)];
-        const int offset = ((p.x & 7) * 8 + (p.y & 7)) * 8 + (p.z & 7);
-        if (!view.values || !view.covered(offset)) return false;
-        corner[std::size_t(c)] = view.values + offset;
-    }
+    if (isFull) return true;
+    for (std::size_t c = 0; c < 8; ++c)
+        if (!tiles[steps.tile[c]].covered(offset + steps.point[c])) return false;
     return true;
 }
 
-void Measurement::locate(Batch& batch) const {
-    const int brickCells = tree_.brickCells();
-    LastLeaf last(tree_, tiles_);
-    for (std::size_t i = 0; i < batch.count; ++i) {
-        const Vec3d& place = batch.placeWorld[i];
-        batch.direct[i] = false;
-        batch.leaf[i] = -1;
-        if (bounds_ && !contains(*bounds_, place)) continue;
-        const std::int32_t leaf = last.find(place);
-        if (leaf < 0) continue;
-        batch.leaf[i] = leaf;
-        const CellPlace at = locateInBrick(last.local(), brickCells);
-        batch.fraction[i] = at.fraction;
-        const int low = tiles_.leaf(std::size_t(leaf)).firstCell;
-        if (at.cell.x < low || at.cell.y < low || at.cell.z < low) continue;
-        if (!findCorners(std::size_t(leaf), at.cell, batch.corner[i])) continue;
-        batch.direct[i] = true;
+// Leaves, cells and corners of the batch's places. Lanes whose cell isn't made of stored samples aren't kept.
+void Measurement::findCells(Batch& batch) const {
+    const double inverseSpacing0 = 1.0 / tree_.spacingWorld(0);
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        if (batch.leaf[i] == kNoSample) continue;
+        const Vec3d place(batch.place[0][i], batch.place[1][i], batch.place[2][i]);
+        batch.leaf[i] = bounds_ && !contains(*bounds_, place) ? kOutsideLeaves
+                                                              : leafOfPlace(tree_, place * inverseSpacing0);
+        if (batch.leaf[i] < 0) continue;
+        const LeafTiles::Leaf& leaf = tiles_.leaf(std::size_t(batch.leaf[i]));
+        for (int a = 0; a < 3; ++a) batch.local[a][i] = place[a] * leaf.inverseSpacing - leaf.firstPoint[a];
+    }
+    measure::locateCells(batch, tree_.brickCells(), tiles_.edge());
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        std::array<const float*, 8>& corner = batch.corner[i];
+        const std::size_t leaf = std::size_t(std::max(batch.leaf[i], 0));
+        const bool isKept =
+            batch.leaf[i] >= 0 && batch.leastCell[i] >= tiles_.leaf(leaf).firstCell &&
+            findCorners(tiles_.tiles(leaf) + batch.tile[i], batch.offset[i], batch.beyond[i], corner);
+        batch.isKept[i] = isKept;
+        if (!isKept) corner.fill(zeros_.data());
         // Corners 4 to 7 lie beside these along z, mostly in the same cache line.
-        for (std::size_t c = 0; c < 4; ++c) __builtin_prefetch(batch.corner[i][c]);
+        for (std::size_t c = 0; c < 4; ++c) __builtin_prefetch(corner[c]);
     }
 }
 
-// |reconstructed - exact| of every field at a sample whose corners are known. False when one isn't finite.
-bool Measurement::fieldErrors(const Batch& batch, std::size_t i, std::span<double> errors) const {
-    const bool isNode = batch.sample[i] < samples_.nodeCount();
-    std::array<double, 8> weights;
-    for (std::size_t c = 0; c < 8; ++c) weights[c] = cornerWeight(batch.fraction[i], int(c));
-    for (std::size_t f = 0; f < errors.size(); ++f) {
+// Errors of the batch's samples: kept, or put off where they aren't made of stored samples alone.
+void Measurement::measureBatch(Batch& batch, Part& part) {
+    for (std::size_t i = std::size_t(batch.count); i < kBatch; ++i) batch.isKept[i] = batch.volume[i] = 0;
+    findCells(batch);
+    const bool isNode = batch.first < samples_.nodeCount();
+    for (std::size_t f = 0; f < lists_.size(); ++f) {
         const SampledField& sampled = samples_.fields()[f];
-        errors[f] = -1;
         if (isNode && sampled.isCell()) continue;
-        const int components = sampled.field->components;
-        double sum = 0;
-        for (int k = 0; k < components; ++k) {
+        const bool isSquared = sampled.field->components > 1;
+        LaneDoubles& errors = batch.errors[f];
+        std::fill(std::begin(errors.lane), std::end(errors.lane), 0.0);
+        for (int k = 0; k < sampled.field->components; ++k) {
             const std::size_t channel = std::size_t(sampled.firstChannel + k);
-            double value = 0;
-            for (std::size_t c = 0; c < 8; ++c)
-                value += weights[c] * double(batch.corner[i][c][channel * kTilePoints]);
-            const double difference = value - batch.exact[channel * kBatch + i];
-            sum += components == 1 ? std::abs(difference) : difference * difference;
+            for (std::size_t i = 0; i < std::size_t(batch.count); ++i)
+                for (std::size_t c = 0; c < 8; ++c)
+                    batch.corners[c][i] = batch.corner[i][c][channel * kTilePoints];
+            measure::addDifference(batch, batch.corners, batch.exact[channel], isSquared, errors);
         }
-        errors[f] = components == 1 ? sum : std::sqrt(sum);
-        if (!std::isfinite(errors[f])) return false;
+        // A value that isn't finite may have come from a corner of weight zero: the long way leaves those
+        // out.
+        measure::finishErrors(batch, isSquared, errors);
     }
-    return true;
+    keepBatch(batch, part);
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        part.outside += batch.leaf[i] == kOutsideLeaves;
+        if (batch.leaf[i] < 0) continue;
+        ++part.inside;
+        if (batch.isKept[i] > 0)
+            ++part.fullyCovered;
+        else
+            part.deferred.push_back({batch.first + std::uint32_t(i), batch.leaf[i], batch.volume[i]});
+    }
+}
+
+void Measurement::keepBatch(const Batch& batch, Part& part) {
+    const bool isNode = batch.first < samples_.nodeCount();
+    LaneFloats listed;
+    LaneDoubles largest{};
+    for (std::size_t f = 0; f < lists_.size(); ++f) {
+        const SampledField& field = samples_.fields()[f];
+        if (isNode && field.isCell()) continue;
+        const double worst = measure::listErrors(batch, batch.errors[f], errorUnit(field), listed);
+        std::copy_n(listed.lane, batch.count, lists_[f].data() + batch.first);
+        if (worst > part.sums[f].worst.error) {
+            std::uint32_t i = 0;
+            while (!(batch.isKept[i] > 0 && batch.errors[f][i] == worst)) ++i;
+            part.sums[f].worst.take(worst, batch.first + i);
+        }
+        if (!isNode) measure::addSquares(batch, listed, centroidWeight(field), part.squares[f]);
+        for (std::size_t i = 0; leafErrors_ && field.range > 0 && i < std::size_t(batch.count); ++i)
+            if (batch.isKept[i] > 0) largest[i] = std::max(largest[i], batch.errors[f][i] / field.range);
+    }
+    for (std::size_t i = 0; leafErrors_ && i < std::size_t(batch.count); ++i)
+        if (batch.isKept[i] > 0) raise((*leafErrors_)[std::size_t(batch.leaf[i])], largest[i]);
 }
 
 void Measurement::keep(std::uint32_t sample, std::int32_t leaf, std::span<const double> errors, Part& part) {
@@ -257,26 +271,18 @@ void Measurement::keep(std::uint32_t sample, std::int32_t leaf, std::span<const 
     if (leafErrors_) raise((*leafErrors_)[std::size_t(leaf)], largest);
 }
 
-void Measurement::measureBatch(Batch& batch, Part& part) {
-    std::array<double, 8> few;
-    std::vector<double> many;
-    if (lists_.size() > few.size()) many.resize(lists_.size());
-    const std::span<double> errors = many.empty() ? std::span(few).first(lists_.size()) : std::span(many);
-    locate(batch);
-    for (std::size_t i = 0; i < batch.count; ++i) {
-        if (batch.leaf[i] < 0) {
-            ++part.outside;
-            continue;
-        }
-        ++part.inside;
-        // A value that isn't finite may have come from a corner of weight zero: the long way leaves those
-        // out.
-        if (batch.direct[i] && fieldErrors(batch, i, errors)) {
-            ++part.fullyCovered;
-            keep(batch.sample[i], batch.leaf[i], errors, part);
-        } else {
-            part.deferred.push_back({batch.sample[i], batch.leaf[i], batch.volume[i]});
-        }
+void Measurement::gatherNodes(std::int64_t begin, std::int64_t end, const NodeSet& used, Batch& batch) const {
+    batch.first = std::uint32_t(begin);
+    batch.count = int(end - begin);
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        const std::size_t node = std::size_t(begin) + i;
+        batch.leaf[i] = used.contains(node) ? kOutsideLeaves : kNoSample;
+        batch.volume[i] = 0;
+        const Vec3d place = samples_.placeWorld(node, tree_.originWorld());
+        for (int a = 0; a < 3; ++a) batch.place[a][i] = place[a];
+        for (const SampledField& field : samples_.fields())
+            for (int c = 0; !field.isCell() && c < field.field->components; ++c)
+                batch.exact[std::size_t(field.firstChannel + c)][i] = field.field->at(std::int64_t(node), c);
     }
 }
 
@@ -284,95 +290,100 @@ std::vector<Part> Measurement::measureNodes(const NodeSet& used) {
     std::vector<Part> parts(std::size_t((mesh_.nodeCount() + kErrorChunk - 1) / kErrorChunk));
     parallelForChunks(execution_, mesh_.nodeCount(), kErrorChunk, [&](std::int64_t begin, std::int64_t end) {
         Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
-        Batch batch(samples_.channels());
-        for (std::int64_t n = begin; n < end; ++n) {
-            const std::size_t node = std::size_t(n);
-            if (used.contains(node)) {
-                batch.sample[batch.count] = std::uint32_t(node);
-                batch.placeWorld[batch.count] = samples_.placeWorld(node, tree_.originWorld());
-                batch.volume[batch.count] = 0;
-                for (const SampledField& field : samples_.fields())
-                    for (int c = 0; !field.isCell() && c < field.field->components; ++c)
-                        batch.exact[std::size_t(field.firstChannel + c) * kBatch + batch.count] =
-                            field.field->at(n, c);
-                ++batch.count;
-            }
-            if (batch.count < kBatch && n + 1 < end) continue;
+        Batch batch(samples_.channels(), lists_.size());
+        for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
+            gatherNodes(first, std::min(end, first + std::int64_t(kBatch)), used, batch);
             measureBatch(batch, part);
-            batch.count = 0;
         }
+        finish(part);
         advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
     });
     measureDeferred(parts);
     return parts;
 }
 
-// Fills the batch with the elements that have a volume, and adds up the exact field's integral.
-void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part) {
-    const Vec3d origin = tree_.originWorld();
+// Those without a volume are no samples. The nodes' errors are known by now.
+void Measurement::gatherElements(std::int64_t begin, std::int64_t end, Batch& batch, Part& part) const {
     const std::int64_t last = mesh_.elementCount() - 1;
-    const double* values = samples_.fields().empty() || samples_.fields()[0].isCell()
-                               ? nullptr
-                               : samples_.fields()[0].field->values.data();
-    const int stride = values ? samples_.fields()[0].field->components : 0;
-    batch.count = 0;
-    for (std::int64_t e = begin; e < end; ++e) {
-        for (const std::int32_t node : mesh_.tets[std::size_t(std::min(e + kPrefetch, last))]) {
-            __builtin_prefetch(&mesh_.points[std::size_t(node)]);
-            if (values) __builtin_prefetch(values + std::int64_t(node) * stride);
+    const std::span<const SampledField> fields = samples_.fields();
+    const double* near = fields.empty() || fields[0].isCell() ? nullptr : fields[0].field->values.data();
+    const int stride = near ? fields[0].field->components : 0;
+    batch.first = std::uint32_t(samples_.nodeCount() + std::size_t(begin));
+    batch.count = int(end - begin);
+    const std::size_t count = std::size_t(batch.count);
+    const std::array<std::int32_t, 4>* const tets = mesh_.tets.data() + begin;
+    const Vec3d* const points = mesh_.points.data();
+    for (std::size_t i = 0; i < count; ++i) {
+        for (const std::int32_t node : tets[std::min(std::int64_t(i) + kPrefetch, last - begin)]) {
+            __builtin_prefetch(points + node);
+            if (near) __builtin_prefetch(near + std::int64_t(node) * stride);
         }
-        const auto& tet = mesh_.tets[std::size_t(e)];
-        const Vec3d &a = mesh_.points[std::size_t(tet[0])], &b = mesh_.points[std::size_t(tet[1])],
-                    &c = mesh_.points[std::size_t(tet[2])], &d = mesh_.points[std::size_t(tet[3])];
-        const SixfoldVolume sixfold = sixfoldVolume(a, b, c, d);
-        const bool certain = std::abs(sixfold.value) > sixfold.errorBound;
-        const int sign = certain ? (sixfold.value > 0 ? 1 : -1) : exactVolumeSign(a, b, c, d);
-        part.flat += sign == 0;
+        batch.leaf[i] = kOutsideLeaves;
+        for (std::size_t k = 0; k < 4; ++k) {
+            const Vec3d& place = points[tets[i][k]];
+            for (int a = 0; a < 3; ++a) batch.nodeWorld[k][a][i] = place[a];
+        }
+    }
+    for (std::size_t f = 0; f < fields.size(); ++f) {
+        const Field& field = *fields[f].field;
+        for (int k = 0; k < field.components; ++k) {
+            LaneDoubles& exact = batch.exact[std::size_t(fields[f].firstChannel + k)];
+            for (std::size_t i = 0; i < count; ++i)
+                exact[i] = samples_.exactValue(samples_.nodeCount() + std::size_t(begin) + i, field, k);
+        }
+        const float* const errors = lists_[f].data();
+        for (std::size_t k = 0; k < 4 && !fields[f].isCell(); ++k)
+            for (std::size_t i = 0; i < count; ++i) batch.nodeErrors[f][k][i] = errors[tets[i][k]];
+    }
+    measure::placeElements(batch, samples_.reference(), tree_.originWorld());
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        int sign = batch.sixfold[i] > 0 ? 1 : -1;
+        if (batch.isCertain[i] == 0) {
+            const auto& tet = mesh_.tets[std::size_t(begin) + i];
+            sign = exactVolumeSign(mesh_.points[std::size_t(tet[0])], mesh_.points[std::size_t(tet[1])],
+                                   mesh_.points[std::size_t(tet[2])], mesh_.points[std::size_t(tet[3])]);
+        }
         part.inverted += sign < 0;
-        if (sign == 0) continue;
-        const std::size_t sample = samples_.nodeCount() + std::size_t(e), i = batch.count++;
-        batch.sample[i] = std::uint32_t(sample);
-        batch.volume[i] = elementVolume(sixfold.value);
-        batch.placeWorld[i] = samples_.centroidWorld(a, b, c, d, origin);
-        for (std::size_t f = 0; f < lists_.size(); ++f) {
-            const SampledField& field = samples_.fields()[f];
-            for (int k = 0; k < field.field->components; ++k) {
-                const double mean = samples_.exactValue(sample, *field.field, k);
-                batch.exact[std::size_t(field.firstChannel + k) * kBatch + i] = mean;
-                if (std::isfinite(mean)) part.sums[f].integralMesh[std::size_t(k)] += batch.volume[i] * mean;
-            }
-        }
+        if (sign != 0) continue;
+        ++part.flat;
+        batch.leaf[i] = kNoSample;
+        batch.volume[i] = 0;
     }
 }
 
-// What a batch of elements adds: their centroids and nodes, one after the other. The sum stays in registers.
-void Measurement::addBatch(std::size_t f, const Batch& batch, FieldSums& sums) const {
-    const float* errors = lists_[f].data();
-    const bool isCell = samples_.fields()[f].isCell();
-    const double ofCentroid = centroidWeight(samples_.fields()[f]);
-    WeightedSquares sum = sums.squares;
-    for (std::size_t i = 0; i < batch.count; ++i) {
-        sum.add(errors[batch.sample[i]], ofCentroid * batch.volume[i]);
-        if (isCell) continue;
-        for (const std::int32_t node : mesh_.tets[batch.sample[i] - samples_.nodeCount()])
-            sum.add(errors[node], kNodeWeight * batch.volume[i]);
+// What elements add beside the centroids' errors: their nodes' and the exact field's integral.
+void Measurement::addElements(const Batch& batch, Part& part) const {
+    for (std::size_t f = 0; f < lists_.size(); ++f) {
+        const SampledField& field = samples_.fields()[f];
+        for (std::size_t k = 0; k < 4 && !field.isCell(); ++k)
+            measure::addSquares(batch, batch.nodeErrors[f][k], kNodeWeight, part.squares[f]);
     }
-    sums.squares = sum;
+    for (std::size_t c = 0; c < batch.exact.size(); ++c)
+        measure::addIntegral(batch, batch.exact[c], part.integrals[c]);
 }
 
-// The nodes' errors are known by now.
+// Adds up the lanes of what a part measured in batches.
+void Measurement::finish(Part& part) const {
+    for (std::size_t f = 0; f < lists_.size(); ++f) {
+        part.sums[f].squares += {part.squares[f].squares.sum(), part.squares[f].weights.sum()};
+        std::vector<double>& integral = part.sums[f].integralMesh;
+        for (std::size_t k = 0; k < integral.size(); ++k)
+            integral[k] += part.integrals[std::size_t(samples_.fields()[f].firstChannel) + k].sum();
+    }
+}
+
 std::vector<Part> Measurement::measureElements() {
     std::vector<Part> parts(std::size_t((mesh_.elementCount() + kErrorChunk - 1) / kErrorChunk));
     parallelForChunks(execution_, mesh_.elementCount(), kErrorChunk,
                       [&](std::int64_t begin, std::int64_t end) {
                           Part& part = parts[std::size_t(begin / kErrorChunk)] = newPart();
-                          Batch batch(samples_.channels());
+                          Batch batch(samples_.channels(), lists_.size());
                           for (std::int64_t first = begin; first < end; first += std::int64_t(kBatch)) {
                               gatherElements(first, std::min(end, first + std::int64_t(kBatch)), batch, part);
                               measureBatch(batch, part);
-                              for (std::size_t f = 0; f < lists_.size(); ++f)
-                                  addBatch(f, batch, part.sums[f]);
+                              addElements(batch, part);
                           }
+                          finish(part);
                           advance(2 * (end - begin) - std::int64_t(part.deferred.size()));
                       });
     measureDeferred(parts);

@@ -112,7 +112,7 @@ std::vector<ScanChannel> channelsOf(const TetMesh& mesh, std::span<const int> fi
 }
 
 ElementBins everyElement(const TetMesh& mesh) {
-    ElementBins bins{{0, mesh.elementCount()}, std::vector<std::int32_t>(mesh.tets.size())};
+    ElementBins bins{{0, mesh.elementCount()}, UninitializedVector<std::int32_t>(mesh.tets.size())};
     std::iota(bins.elements.begin(), bins.elements.end(), 0);
     return bins;
 }
