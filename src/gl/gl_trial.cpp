@@ -30,7 +30,7 @@ constexpr int kReasonDescriptor = 3;  // of the child: a pipe
 constexpr std::string_view kGreeting = "trial\n";
 constexpr std::size_t kLongestReason = 512;  // a pipe takes that and the greeting without a reader
 constexpr int kExitUnavailable = 3;
-constexpr double kLeastSeconds = 2;  // of a driver that is tried behind another
+constexpr double kLeastSeconds = 1.5;  // of a driver that is tried behind another
 constexpr std::int64_t kAtOnceBytes = std::int64_t(1) << 30;
 constexpr double kTickMs = 2;
 
@@ -96,8 +96,9 @@ void drawTexels(GlContext& context) {
 /// A process under trial.
 class Trial {
   public:
-    /// @param endMs of tryDrivers' time, when the driver is given up.
-    Trial(const GlTrial& trial, const std::string& word, double endMs) : trial_(trial), endMs_(endMs) {
+    /// @param spentMs of tryDrivers' time. @param seconds after which the driver is given up.
+    Trial(const GlTrial& trial, const std::string& word, double spentMs, double seconds)
+        : endMs_(spentMs + seconds * 1e3), seconds_(seconds) {
         int ends[2];
         if (::pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0) failToStart(kTask, "pipe", errno);
         reason_ = Descriptor(ends[0]);
@@ -114,7 +115,7 @@ class Trial {
         if (end) return resultOf(*end);
         if (spentMs < endMs_) return std::nullopt;
         child_.reset();
-        return GlTrialResult{"the driver didn't answer within " + shortNumber(trial_.seconds) + " s", true};
+        return GlTrialResult{"the driver didn't answer within " + shortNumber(seconds_) + " s", true};
     }
 
   private:
@@ -130,8 +131,7 @@ class Trial {
         return {"the driver " + (end.bySignal ? end.words : "ended the process that tried it"), true};
     }
 
-    const GlTrial& trial_;
-    double endMs_;
+    double endMs_, seconds_;
     Descriptor reason_;
     std::optional<ChildProcess> child_;
 };
@@ -161,9 +161,11 @@ std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std:
             running += trials[i].has_value();
         }
         for (; started < words.size() && (running == 0 || isAtOnce); ++started) {
-            const double leastMs = started == 0 ? 0 : spentMs + kLeastSeconds * 1e3;
+            const double left = started == 0 || isAtOnce
+                                    ? trial.seconds
+                                    : std::max(trial.seconds - spentMs / 1e3, kLeastSeconds);
             try {
-                trials[started].emplace(trial, words[started], std::max(trial.seconds * 1e3, leastMs));
+                trials[started].emplace(trial, words[started], spentMs, left);
                 ++running;
             } catch (const IoError& error) {
                 results[started].reason = error.what();

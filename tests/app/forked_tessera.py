@@ -12,15 +12,17 @@ TIMEOUT_S = 300
 
 
 class ForkedTessera:
-    """run() is subprocess.run() with captured text. Each thread has a process of its own; where the build lacks the program beside
-    tessera, tessera itself is run."""
+    """run() is subprocess.run() with captured text; what it returns says too how many seconds of processor time (cpu_s) and bytes of
+    memory (peak_bytes) the run took. Each thread has a process of its own; where the build lacks the program beside tessera, tessera
+    itself is run, without these."""
 
     def __init__(self, tessera):
         self.tessera = str(tessera)
         self.program = pathlib.Path(tessera).resolve().parent / "forked_tessera"
         self.local = threading.local()
 
-    def run(self, arguments, cwd=None):
+    def run(self, arguments, cwd=None, watch=None, tick_s=TIMEOUT_S):
+        """@param watch is called with the process's number after every tick; without it a tick without an end is an error."""
         words = list(map(str, arguments))
         if not self.program.exists():
             return subprocess.run([self.tessera, *words], capture_output=True, text=True, timeout=TIMEOUT_S, cwd=cwd)
@@ -32,9 +34,14 @@ class ForkedTessera:
             process = self.local.process
             process.stdin.write(struct.pack("=I", len(request)) + request)
             process.stdin.flush()
-            if not select.select([process.stdout], [], [], TIMEOUT_S)[0]:
-                os.killpg(process.pid, 9)
-                raise subprocess.TimeoutExpired(words, TIMEOUT_S)
-            status = os.waitstatus_to_exitcode(struct.unpack("=i", process.stdout.read(4))[0])
-            texts = [pathlib.Path(path).read_text(encoding="utf-8") for path in outputs]
-        return subprocess.CompletedProcess([self.tessera, *words], status, *texts)
+            while not select.select([process.stdout], [], [], tick_s)[0]:
+                if watch is None:
+                    os.killpg(process.pid, 9)
+                    raise subprocess.TimeoutExpired(words, tick_s)
+                for child in pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split():
+                    watch(int(child))
+            status, microseconds, kibibytes = struct.unpack("=iqq", process.stdout.read(20))
+            texts = [pathlib.Path(path).read_text(encoding="utf-8", errors="backslashreplace") for path in outputs]
+        result = subprocess.CompletedProcess([self.tessera, *words], os.waitstatus_to_exitcode(status), *texts)
+        result.cpu_s, result.peak_bytes = microseconds / 1e6, kibibytes << 10
+        return result

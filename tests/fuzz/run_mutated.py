@@ -16,7 +16,6 @@ import functools
 import os
 import pathlib
 import random
-import select
 import shutil
 import signal
 import subprocess
@@ -27,6 +26,9 @@ import time
 import mutate_files
 import mutate_mesh
 import mutate_vdb
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1] / "app"))
+from forked_tessera import ForkedTessera  # noqa: E402
 
 FORMATS = ["vtk", *mutate_files.PLAIN_FORMATS, *mutate_files.WRITTEN_FORMATS, "vdb"]
 LONGEST_S = 10
@@ -94,29 +96,25 @@ def tree_bytes(pid):
     return total
 
 
-def measured(command, folder):
+def measured(forked, arguments, folder):
     """Exit code, seconds (of a busy machine: those of its processors), peak bytes of the process with its children and of it alone, standard error; ends what runs too long or grows too large."""
     begin = time.monotonic()
-    with open(folder / ".stderr", "wb") as errors:
-        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
-    watch = os.pidfd_open(process.pid)
     peak = own_peak = 0
-    try:
+    is_ended = False
+
+    def watch(process):
+        nonlocal peak, own_peak, is_ended
+        own_peak = max(own_peak, own_bytes(process))
+        peak = max(peak, tree_bytes(process))
         # Some room beyond the limits, so that what is reported is how far a run went and not where it was ended.
-        while not select.select([watch], [], [], POLL_S)[0]:
-            own_peak = max(own_peak, own_bytes(process.pid))
-            peak = max(peak, tree_bytes(process.pid))
-            if time.monotonic() - begin > (BUSY_WAIT_S if busy else 2 * LONGEST_S) or peak > 1.5 * LARGEST_BYTES:
-                os.killpg(process.pid, signal.SIGKILL)
-    finally:
-        os.close(watch)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    seconds = usage.ru_utime + usage.ru_stime if busy and process.returncode != -signal.SIGKILL else time.monotonic() - begin
-    text = (folder / ".stderr").read_bytes().decode(errors="replace")
-    (folder / ".stderr").unlink()
+        if time.monotonic() - begin > (BUSY_WAIT_S if busy else 2 * LONGEST_S) or peak > 1.5 * LARGEST_BYTES:
+            is_ended = True
+            os.kill(process, signal.SIGKILL)
+
+    run = forked.run(arguments, cwd=folder, watch=watch, tick_s=POLL_S)
+    seconds = run.cpu_s if busy and not is_ended else time.monotonic() - begin
     # The children that were waited for count too: the kernel keeps the largest.
-    return process.returncode, seconds, max(peak, usage.ru_maxrss << 10), own_peak, text
+    return run.returncode, seconds, max(peak, run.peak_bytes), own_peak, run.stderr
 
 
 def faults_of(code, seconds, peak, stderr, new_files, output):
@@ -158,7 +156,7 @@ def run_case(program, name, files, mesh, command_name, keep, origin):
     folder = pathlib.Path(tempfile.mkdtemp(prefix="tessera-mutant-"))
     try:
         write_files(folder, files)
-        code, seconds, peak, _, stderr = measured([program, *arguments], folder)
+        code, seconds, peak, _, stderr = measured(program, arguments, folder)
         new_files = {str(p.relative_to(folder)) for p in folder.rglob("*") if not p.is_dir()} - set(files)
         faults = faults_of(code, seconds, peak, stderr, new_files, output)
         if faults:
@@ -193,8 +191,8 @@ def make_vdb_files(program):
         name = next(name for name, file in mutate_mesh.sound_files().items() if file().extension == ".vtu")
         (folder / "mesh.vtu").write_bytes(mutate_mesh.sound_files()[name]().serialise())
         for made, words in MADE_FROM.items():
-            subprocess.run([program, "resample", "mesh.vtu", "-o", f"{made}.vdb", "--quiet", *words], cwd=folder, check=True)
-        subprocess.run([program, *LOG_COMMAND], cwd=folder, check=True)
+            subprocess.run([program.tessera, "resample", "mesh.vtu", "-o", f"{made}.vdb", "--quiet", *words], cwd=folder, check=True)
+        subprocess.run([program.tessera, *LOG_COMMAND], cwd=folder, check=True)
         return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "out.vdb"}
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -214,7 +212,7 @@ def run_vdb_mutant(program, seed, index, keep, sound):
     try:
         (folder / bad).write_bytes(data)
         (folder / "mesh.vtu").write_bytes(sound["mesh.vtu"])
-        code, seconds, peak, own_peak, stderr = measured([program, *words], folder)
+        code, seconds, peak, own_peak, stderr = measured(program, words, folder)
         new_files = {path.name for path in folder.iterdir()} - {bad, "mesh.vtu"}
         faults = faults_of(code, seconds, peak, stderr, new_files, output)
         if peak > LARGEST_VDB_BYTES:
@@ -273,8 +271,10 @@ def main():
     arguments = parser.parse_args()
     global busy
     busy = arguments.busy
-    program = str(pathlib.Path(arguments.tessera).resolve())
-    writer = arguments.writer or str(pathlib.Path(program).parents[2] / "tests" / "write_box_files")
+    program = ForkedTessera(pathlib.Path(arguments.tessera).resolve())
+    if not program.program.exists():
+        parser.error(f"there is no {program.program}")
+    writer = arguments.writer or str(pathlib.Path(program.tessera).parents[2] / "tests" / "write_box_files")
     formats = arguments.format.split(",")
     if unknown := [name for name in formats if name not in FORMATS]:
         parser.error(f"there is no format {unknown[0]}; known are {', '.join(FORMATS)}")
