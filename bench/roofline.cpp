@@ -15,6 +15,7 @@
 #include <cstring>
 #include <functional>
 #include <memory>
+#include <new>
 #include <numeric>
 #include <string>
 #include <thread>
@@ -59,7 +60,7 @@ double timeShares(int threads, std::size_t count, const std::function<void(std::
     return timer.elapsedMs();
 }
 
-/// Steps of eight chains, which no memory and no other step holds up.
+/// Steps of eight chains that need no memory.
 void compute(std::size_t steps) {
     std::array<double, 8> x{1, 2, 3, 4, 5, 6, 7, 8};
     for (std::size_t i = 0; i < steps; ++i)
@@ -73,6 +74,7 @@ class Pages {
     explicit Pages(bool large)
         : data_(static_cast<char*>(
               ::mmap(nullptr, kProbeBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0))) {
+        if (data_ == MAP_FAILED) throw std::bad_alloc();
         ::madvise(data_, kProbeBytes, large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
     }
     ~Pages() { ::munmap(data_, kProbeBytes); }
@@ -125,7 +127,7 @@ void printMachine(int threads, const Machine& m) {
 
 struct Run {
     double plan = 0, bin = 0, sample = 0, store = 0, report = 0;
-    std::int64_t voxels = 0, tiles = 0;
+    std::int64_t voxels = 0;
 
     double withoutReport() const { return plan + bin + sample + store; }
     double all() const { return withoutReport() + report; }

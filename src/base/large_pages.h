@@ -12,6 +12,9 @@ namespace tessera {
 /// several threads can.
 template <class Item>
 struct UninitializedAllocator : std::allocator<Item> {
+    UninitializedAllocator() = default;
+    template <class Other>
+    UninitializedAllocator(const UninitializedAllocator<Other>& other) : std::allocator<Item>(other) {}
     template <class Other>
     struct rebind {
         using other = UninitializedAllocator<Other>;

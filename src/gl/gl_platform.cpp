@@ -60,7 +60,7 @@ class Probes {
         if (trial_ && !unknown.empty()) results = tryGl(*trial_, unknown);
         for (std::size_t i = 0; i < unknown.size(); ++i) {
             GlTrialResult& result = results[i];
-            if (result.reason.empty() && result.found.empty()) {
+            if (result.reason.empty() && result.found != kSoftwareFound && result.found != kHardwareFound) {
                 const OpenedDevice& device = opened(unknown[i]);
                 slot(unknown[i]) = {device.reason, false, device.info.isSoftware};
             } else {
@@ -174,11 +174,14 @@ void throwIfUnavailable(GlPlatform platform) {
     throwReason(platform, unavailableReason(platform));
 }
 
+const std::string& openGlDevice(GlPlatform platform) {
+    const std::string& reason = unavailableReason(platform);
+    return reason.empty() ? probes().open(platform).reason : reason;
+}
+
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform) {
-    throwIfUnavailable(platform);
-    const OpenedDevice& device = probes().open(platform);
-    throwReason(platform, device.reason);
-    return device.info;
+    throwReason(platform, openGlDevice(platform));
+    return probes().open(platform).info;
 }
 
 bool isSoftwareGl(GlPlatform platform) {
@@ -206,8 +209,11 @@ GlPlatform chooseGlPlatform(std::optional<GlPlatform> wanted) {
         throwIfUnavailable(*wanted);
         return *wanted;
     }
-    if (!availableGlPlatforms().empty()) return availableGlPlatforms().front();
-    throw GlError(noGlReason());
+    if (availableGlPlatforms().empty()) throw GlError(noGlReason());
+    for (const GlPlatform platform : availableGlPlatforms())
+        if (openGlDevice(platform).empty()) return platform;
+    const GlPlatform best = availableGlPlatforms().front();
+    throw GlError("no OpenGL from " + std::string(nameOf(best)) + ": " + openGlDevice(best));
 }
 
 }  // namespace tessera

@@ -40,6 +40,10 @@ void throwIfUnavailable(GlPlatform platform);
 /// The processor emulates the device of an available platform.
 bool isSoftwareGl(GlPlatform platform);
 
+/// Opens the device in this process; only the first call for a platform takes time. Why that isn't possible,
+/// which it may not be though a trial found it available; else empty.
+const std::string& openGlDevice(GlPlatform platform);
+
 /// The device that an available platform gives. Opens it in this process.
 /// @throws GlError with the reason when it is not available.
 const GlDeviceInfo& glDeviceInfo(GlPlatform platform);
@@ -48,7 +52,7 @@ const GlDeviceInfo& glDeviceInfo(GlPlatform platform);
 /// egl-surfaceless, osmesa, and egl-device when it is software.
 const std::vector<GlPlatform>& availableGlPlatforms();
 
-/// The platform asked for or, when none is, the best one.
+/// The platform asked for or, when none is, the best one of those that can be opened in this process.
 /// @throws GlError with every reason that matters when there is none.
 GlPlatform chooseGlPlatform(std::optional<GlPlatform> wanted = {});
 

@@ -163,7 +163,8 @@ std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std:
         for (; started < words.size() && (running == 0 || isAtOnce); ++started) {
             const double left = started == 0 || isAtOnce
                                     ? trial.seconds
-                                    : std::max(trial.seconds - spentMs / 1e3, kLeastSeconds);
+                                    : std::clamp(trial.seconds - spentMs / 1e3,
+                                                 std::min(kLeastSeconds, trial.seconds), trial.seconds);
             try {
                 trials[started].emplace(trial, words[started], spentMs, left);
                 ++running;

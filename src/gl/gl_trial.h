@@ -22,7 +22,7 @@ struct GlTrial {
     std::vector<std::string> arguments;  ///< before those that serveGlTrial gets
     double seconds = 20;                 ///< that it may take until the end
     const std::atomic<bool>* cancel = nullptr;
-    std::int64_t maxMemoryBytes = 0;  ///< of all together; emulated ones take 60 MB each. 0: no bound
+    std::int64_t maxMemoryBytes = 0;  ///< that is aimed at; emulated ones take 60 MB each. 0: no bound
 };
 
 /// What came of it.
@@ -34,7 +34,7 @@ struct GlTrialResult {
 
 /// Tries drivers, each in a process of its own, which is told one of the words and does what serveTrial's
 /// caller does for that: all at once, or in turn where memory is bounded to less than 1 GiB; those after the
-/// first then have what is left of the seconds, at least 1.5. A program that knows nothing of trials gives no
+/// first then have what is left of the seconds, at least 1.5 of them. A program that knows nothing of trials gives no
 /// reason and tells nothing.
 /// @throws Cancelled.
 std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words);

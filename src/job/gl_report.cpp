@@ -116,32 +116,20 @@ Json deviceJson(const GlDeviceInfo& info) {
             {"extensions", info.extensions}};
 }
 
-/// Null, and why, where the platform isn't available, or fails in this process though its trial didn't.
-const GlDeviceInfo* openDevice(GlPlatform platform, std::string& reason) {
-    reason = unavailableReason(platform);
-    if (!reason.empty()) return nullptr;
-    try {
-        return &glDeviceInfo(platform);
-    } catch (const GlError& error) {
-        reason = error.what();
-        return nullptr;
-    }
-}
-
 }  // namespace
 
 std::string glText(std::size_t width) {
     std::string text, order;
     std::vector<GlDeviceInfo> devices;
     for (const GlPlatform platform : availableGlPlatforms())
-        order += (order.empty() ? "" : ", ") + std::string(nameOf(platform));
+        if (openGlDevice(platform).empty())
+            order += (order.empty() ? "" : ", ") + std::string(nameOf(platform));
     for (const GlPlatform platform : glPlatforms()) {
-        std::string reason;
-        const GlDeviceInfo* device = openDevice(platform, reason);
-        text += fmt::format("{}: {}\n", nameOf(platform), device ? "available" : "no, " + reason);
-        if (!device) continue;
-        devices.push_back(*device);
-        text += deviceText(*device);
+        const std::string& reason = openGlDevice(platform);
+        text += fmt::format("{}: {}\n", nameOf(platform), reason.empty() ? "available" : "no, " + reason);
+        if (!reason.empty()) continue;
+        devices.push_back(glDeviceInfo(platform));
+        text += deviceText(devices.back());
     }
     text += fmt::format("order of preference: {}\n", order.empty() ? "none is available" : order);
     return devices.empty() ? text : text + limitsText(devices, width) + formatsText(devices, width);
@@ -149,13 +137,13 @@ std::string glText(std::size_t width) {
 
 Json glJson() {
     Json platforms = Json::array(), order = Json::array();
-    for (const GlPlatform platform : availableGlPlatforms()) order.push_back(nameOf(platform));
+    for (const GlPlatform platform : availableGlPlatforms())
+        if (openGlDevice(platform).empty()) order.push_back(nameOf(platform));
     for (const GlPlatform platform : glPlatforms()) {
-        std::string reason;
-        const GlDeviceInfo* device = openDevice(platform, reason);
-        Json entry{{"name", nameOf(platform)}, {"available", device != nullptr}};
-        if (device)
-            entry["device"] = deviceJson(*device);
+        const std::string& reason = openGlDevice(platform);
+        Json entry{{"name", nameOf(platform)}, {"available", reason.empty()}};
+        if (reason.empty())
+            entry["device"] = deviceJson(glDeviceInfo(platform));
         else
             entry["reason"] = reason;
         platforms.push_back(entry);

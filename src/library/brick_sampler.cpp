@@ -31,7 +31,9 @@ BrickSampler::BrickSampler(const TetMesh& mesh, const SamplerOptions& options)
     bind.route = Route::index;
     bind.index = std::make_shared<const SharedElementIndex>(mesh);
     tryDriversFor(options.algorithm);
-    parts_->bound = chooseResampler(options.algorithm, bind).resampler->bind(mesh, chosen.fields, bind);
+    ResamplerChoice choice = chooseResampler(options.algorithm, bind);
+    parts_->bound = runChosen(
+        choice, bind, [&](const Resampler& resampler) { return resampler.bind(mesh, chosen.fields, bind); });
     const Box3d bounds = mesh.boundsWorld();
     if (bounds.empty()) throw InputError("the mesh has no elements");
     parts_->originWorld = bounds.min;

@@ -483,7 +483,7 @@ std::string RasterResampler::unavailableReason() const {
 }
 
 double RasterResampler::relativeCost() const {
-    return cost_ * (isSoftwareGl(chooseGlPlatform()) ? kEmulatedCost : kDeviceCost);
+    return cost_ * (isSoftwareGl(availableGlPlatforms().front()) ? kEmulatedCost : kDeviceCost);
 }
 
 WorkMemory RasterResampler::workMemory(int channels) const {

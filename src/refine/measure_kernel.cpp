@@ -80,8 +80,9 @@ void placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& ori
                                 hn::Mul(set(0x1p-1000), hn::Add(hn::Add(hn::Add(wx, wy), wz), set(1))));
         store(volume, batch.sixfold, i);
         store(hn::IfThenElseZero(hn::Gt(hn::Abs(volume), bound), set(1)), batch.isCertain, i);
-        store(hn::Max(hn::Div(hn::Abs(volume), set(6)), set(std::numeric_limits<double>::denorm_min())),
-              batch.volume, i);
+        const V size = hn::Div(hn::Abs(volume), set(6));
+        const V least = set(std::numeric_limits<double>::denorm_min());
+        store(hn::IfThenElse(hn::Lt(size, least), least, size), batch.volume, i);
     });
 }
 

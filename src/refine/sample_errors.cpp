@@ -48,7 +48,7 @@ struct Batch : MeasureBatch {
     std::uint32_t first = 0;  // sample of the first lane
     std::array<std::int32_t, kBatch> leaf;
     std::array<std::array<const float*, 8>, kBatch> corner;
-    LaneFloats corners[8];                              // values of one channel
+    LaneFloats corners[8]{};                            // values of one channel
     std::vector<LaneDoubles> exact;                     // one a channel
     std::vector<LaneDoubles> errors;                    // one a field
     std::vector<std::array<LaneFloats, 4>> nodeErrors;  // one a field: of elements

@@ -97,8 +97,8 @@ TEST_F(GlTrials, InLittleMemoryOneIsTriedAfterAnother) {
     const Timer timer;
     const std::vector<GlTrialResult> results = tryGl(trial, kEgl);
     EXPECT_EQ(results[0].reason, "the driver didn't answer within 0.25 s");
-    EXPECT_EQ(results[1].reason, "the driver didn't answer within 1.5 s");
-    EXPECT_GE(timer.elapsedMs(), 1700) << "both at once";
+    EXPECT_EQ(results[1].reason, "the driver didn't answer within 0.25 s");
+    EXPECT_GE(timer.elapsedMs(), 500) << "both at once";
 }
 
 TEST_F(GlTrials, AStallGivesWayToCancellation) {
