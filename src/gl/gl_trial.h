@@ -34,8 +34,8 @@ struct GlTrialResult {
 
 /// Tries drivers, each in a process of its own, which is told one of the words and does what serveTrial's
 /// caller does for that: all at once, or in turn where memory is bounded to less than 1 GiB; those after the
-/// first then have what is left of the seconds, at least 1.5 of them. A program that knows nothing of trials gives no
-/// reason and tells nothing.
+/// first then have what is left of the seconds, at least 1.5 of them. A program that knows nothing of trials
+/// gives no reason and tells nothing.
 /// @throws Cancelled.
 std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words);
 
