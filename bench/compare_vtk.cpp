@@ -7,7 +7,6 @@
 
 #include <cstdio>
 #include <exception>
-#include <numeric>
 #include <string>
 #include <vector>
 
@@ -15,10 +14,8 @@
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_mesh.h"
-#include "refine/brick_result.h"
-#include "refine/refine.h"
-#include "refine/refine_options.h"
 #include "tessera/registry.h"
+#include "uniform_run.h"
 #include "vtk_resample.h"
 
 namespace {
@@ -40,14 +37,8 @@ struct Sample {
 
 Sample runOnce(const tessera::TetMesh& mesh, const std::vector<int>& fields,
                const tessera::Resampler& resampler, int points, int threads) {
-    tessera::RefineOptions options;
-    options.criterion = tessera::Criterion::uniform;
-    options.resolution = points;
-    tessera::Execution execution;
-    execution.threads = threads;
     const tessera::Timer timer;
-    const tessera::BrickResult result =
-        tessera::refineAndResample(mesh, fields, resampler, options, execution);
+    const tessera::BrickResult result = tessera::bench::runUniform(mesh, fields, resampler, points, threads);
     Sample sample;
     sample.totalMs = timer.elapsedMs();
     sample.planMs = result.times.planMs;
@@ -98,8 +89,7 @@ void compare(const Options& options) {
     for (const std::string& name : options.algorithms) resamplers.push_back(&tessera::findResampler(name));
     const tessera::bench::VtkResample vtk(options.meshPath, options.threads);
     const tessera::MeshFile file = tessera::readMesh(options.meshPath, {}, {});
-    std::vector<int> fields(file.mesh.fields.size());
-    std::iota(fields.begin(), fields.end(), 0);
+    const std::vector<int> fields = tessera::everyField(file.mesh);
     fmt::print(
         "{} elements, {} threads, VTK backend {}, median of {} interleaved runs after one run of every "
         "algorithm that isn't timed (OpenGL compiles its shaders then), milliseconds\n",

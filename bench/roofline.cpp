@@ -27,11 +27,9 @@
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_mesh.h"
-#include "refine/brick_result.h"
-#include "refine/refine.h"
-#include "refine/refine_options.h"
 #include "resample/statistic_names.h"
 #include "tessera/registry.h"
+#include "uniform_run.h"
 
 namespace {
 
@@ -134,13 +132,8 @@ struct Run {
 };
 
 Run runOnce(const tessera::TetMesh& mesh, const std::vector<int>& fields, int points, int threads) {
-    tessera::RefineOptions options;
-    options.criterion = tessera::Criterion::uniform;
-    options.resolution = points;
-    tessera::Execution execution;
-    execution.threads = threads;
     const tessera::BrickResult result =
-        tessera::refineAndResample(mesh, fields, tessera::findResampler("software"), options, execution);
+        tessera::bench::runUniform(mesh, fields, tessera::findResampler("software"), points, threads);
     Run run;
     run.plan = result.times.planMs;
     run.bin = result.statistics.ms(tessera::stage::bin);
@@ -192,8 +185,7 @@ std::string row(int points, int threads, double least, const std::vector<Run>& r
 
 void measure(const Options& options) {
     const tessera::MeshFile file = tessera::readMesh(options.meshPath, {}, {});
-    std::vector<int> fields(file.mesh.fields.size());
-    std::iota(fields.begin(), fields.end(), 0);
+    const std::vector<int> fields = tessera::everyField(file.mesh);
     std::vector<int> threadCounts{1};
     if (options.threads > 1) threadCounts.push_back(options.threads);
     std::vector<Machine> machines;

@@ -22,6 +22,10 @@ struct SeamValue {
     bool covered = false;  ///< in the mesh; else the value is that of the nearest mesh point
 };
 
+/// Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can tell
+/// apart, and more than the rounding of a place in index space.
+inline constexpr double kOnLatticePlane = 1.0 / (1 << 30);
+
 /// A place inside a brick: its cell, and where in the cell.
 struct CellPlace {
     Vec3i cell{0};      ///< local, in [0, B) on every axis
@@ -30,15 +34,12 @@ struct CellPlace {
 /// @param local place in index space of the brick's level, counted from the brick's first point; may be off
 /// by rounding.
 inline CellPlace locateInBrick(const Vec3d& local, int brickCells) {
-    // Share of a voxel below which a place counts as lying on a lattice plane: less than stored floats can
-    // tell apart, and more than the rounding of a place in index space.
-    constexpr double kOnPlane = 1.0 / (1 << 30);
     CellPlace place;
     for (int a = 0; a < 3; ++a) {
         const int cell = int(std::min(std::max(local[a], 0.0), double(brickCells - 1)));
         const double t = local[a] - cell;
         place.cell[a] = cell;
-        place.fraction[a] = t < kOnPlane ? 0 : t > 1 - kOnPlane ? 1 : t;
+        place.fraction[a] = t < kOnLatticePlane ? 0 : t > 1 - kOnLatticePlane ? 1 : t;
     }
     return place;
 }

@@ -212,8 +212,7 @@ GlPlatform chooseGlPlatform(std::optional<GlPlatform> wanted) {
     if (availableGlPlatforms().empty()) throw GlError(noGlReason());
     for (const GlPlatform platform : availableGlPlatforms())
         if (openGlDevice(platform).empty()) return platform;
-    const GlPlatform best = availableGlPlatforms().front();
-    throw GlError("no OpenGL from " + std::string(nameOf(best)) + ": " + openGlDevice(best));
+    return glDeviceInfo(availableGlPlatforms().front()).platform;  // throws why the best one can't be opened
 }
 
 }  // namespace tessera

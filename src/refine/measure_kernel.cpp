@@ -2,16 +2,11 @@
 
 #include <limits>
 
-#include "base/sanitizers.h"
+#include "base/vector_targets.h"
+#include "brick/seams.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "refine/measure_kernel.cpp"
-// Each costs its compile time; under a sanitizer two have to do.
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3 | HWY_AVX3_DL)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -87,7 +82,6 @@ void placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& ori
 }
 
 void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
-    constexpr double kOnPlane = 1.0 / (1 << 30);
     const V last = set(brickCells - 1), edge = set(tilesPerEdge), eight = set(8);
     forVectors(batch, [&](std::size_t i) {
         V tile = hn::Zero(D()), offset = hn::Zero(D()), beyond = hn::Zero(D()), least = last;
@@ -95,8 +89,8 @@ void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
             const V local = load(batch.local[a], i);
             const V cell = hn::Floor(hn::Min(hn::Max(local, hn::Zero(D())), last));
             const V t = hn::Sub(local, cell);
-            store(hn::IfThenElse(hn::Gt(t, set(1 - kOnPlane)), set(1),
-                                 hn::IfThenZeroElse(hn::Lt(t, set(kOnPlane)), t)),
+            store(hn::IfThenElse(hn::Gt(t, set(1 - kOnLatticePlane)), set(1),
+                                 hn::IfThenZeroElse(hn::Lt(t, set(kOnLatticePlane)), t)),
                   batch.fraction[a], i);
             const V ofTile = hn::Floor(hn::Mul(cell, set(0.125)));
             const V in = hn::Sub(cell, hn::Mul(ofTile, eight));

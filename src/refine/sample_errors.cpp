@@ -240,7 +240,6 @@ void Measurement::measureBatch(Batch& batch, Part& part) {
 void Measurement::keepBatch(const Batch& batch, Part& part) {
     const bool isNode = batch.first < samples_.nodeCount();
     LaneFloats listed;
-    LaneDoubles largest{};
     for (std::size_t f = 0; f < lists_.size(); ++f) {
         const SampledField& field = samples_.fields()[f];
         if (isNode && field.isCell()) continue;
@@ -252,11 +251,11 @@ void Measurement::keepBatch(const Batch& batch, Part& part) {
             part.sums[f].worst.take(worst, batch.first + i);
         }
         if (!isNode) measure::addSquares(batch, listed, centroidWeight(field), part.squares[f]);
-        for (std::size_t i = 0; leafErrors_ && field.range > 0 && i < std::size_t(batch.count); ++i)
-            if (batch.isKept[i] > 0) largest[i] = std::max(largest[i], batch.errors[f][i] / field.range);
+        if (!leafErrors_ || !(field.range > 0)) continue;
+        for (std::size_t i = 0; i < std::size_t(batch.count); ++i)
+            if (batch.isKept[i] > 0)
+                raise((*leafErrors_)[std::size_t(batch.leaf[i])], batch.errors[f][i] / field.range);
     }
-    for (std::size_t i = 0; leafErrors_ && i < std::size_t(batch.count); ++i)
-        if (batch.isKept[i] > 0) raise((*leafErrors_)[std::size_t(batch.leaf[i])], largest[i]);
 }
 
 void Measurement::keep(std::uint32_t sample, std::int32_t leaf, std::span<const double> errors, Part& part) {

@@ -18,17 +18,11 @@
 #include <span>
 #include <vector>
 
-#include "base/sanitizers.h"
+#include "base/vector_targets.h"
 #include "software/scan_kernel.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "software/scan_kernel.cpp"
-// Each costs its compile time; under a sanitizer two have to do.
-#if defined(TESSERA_ADDRESS_SANITIZER) || defined(TESSERA_THREAD_SANITIZER)
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SSE4 | HWY_AVX3 | HWY_AVX3_DL)
-#else
-#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
-#endif
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
