@@ -225,21 +225,35 @@ void AtomicFile::commit(const Execution& execution) {
     slot_ = -1;
 }
 
-AtomicFileBuffer::AtomicFileBuffer(AtomicFile& file, const Execution& execution)
-    : file_(&file), execution_(&execution), buffer_(kBufferBytes) {
-    setp(buffer_.data(), buffer_.data() + buffer_.size());
+AtomicFileBuffer::AtomicFileBuffer(AtomicFile& file, const Execution& execution, Watch watch)
+    : file_(&file), execution_(&execution), watch_(std::move(watch)) {
+    for (std::unique_ptr<char[]>& piece : pieces_)
+        piece = std::make_unique_for_overwrite<char[]>(kBufferBytes);
+    setp(pieces_[0].get(), pieces_[0].get() + kBufferBytes);
+}
+
+void AtomicFileBuffer::handOver() {
+    execution_->throwIfCancelled();
+    if (writing_.valid()) writing_.get();
+    const std::span<const char> piece(pbase(), pptr());
+    if (piece.empty()) return;
+    const auto policy = execution_->threadCount() > 1 ? std::launch::async : std::launch::deferred;
+    writing_ = std::async(policy, [this, piece, offset = bufferStart_] {
+        if (watch_) watch_(piece);
+        file_->writeAt(offset, piece.data(), piece.size());
+    });
+    bufferStart_ += std::int64_t(piece.size());
+    std::swap(pieces_[0], pieces_[1]);
+    setp(pieces_[0].get(), pieces_[0].get() + kBufferBytes);
 }
 
 void AtomicFileBuffer::flushAll() {
-    const std::size_t pending = std::size_t(pptr() - pbase());
-    execution_->throwIfCancelled();
-    if (pending > 0) file_->writeAt(bufferStart_, pbase(), pending);
-    bufferStart_ += std::int64_t(pending);
-    setp(buffer_.data(), buffer_.data() + buffer_.size());
+    handOver();
+    if (writing_.valid()) writing_.get();
 }
 
 AtomicFileBuffer::int_type AtomicFileBuffer::overflow(int_type c) {
-    flushAll();
+    handOver();
     if (!traits_type::eq_int_type(c, traits_type::eof())) {
         *pptr() = traits_type::to_char_type(c);
         pbump(1);
@@ -248,16 +262,14 @@ AtomicFileBuffer::int_type AtomicFileBuffer::overflow(int_type c) {
 }
 
 std::streamsize AtomicFileBuffer::xsputn(const char* s, std::streamsize n) {
-    if (n > epptr() - pptr()) {
-        flushAll();
-        if (n >= std::streamsize(buffer_.size())) {
-            file_->writeAt(bufferStart_, s, std::size_t(n));
-            bufferStart_ += n;
-            return n;
-        }
+    for (std::streamsize left = n; left > 0;) {
+        if (pptr() == epptr()) handOver();
+        const std::streamsize count = std::min(left, std::streamsize(epptr() - pptr()));
+        std::memcpy(pptr(), s, std::size_t(count));
+        pbump(int(count));
+        s += count;
+        left -= count;
     }
-    std::memcpy(pptr(), s, std::size_t(n));
-    pbump(int(n));
     return n;
 }
 

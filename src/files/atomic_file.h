@@ -1,7 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <future>
+#include <memory>
+#include <span>
 #include <streambuf>
 #include <string>
 #include <vector>
@@ -60,11 +65,16 @@ class AtomicFile {
     std::int64_t size_ = 0;
 };
 
-/// Output side of a std::ostream over an AtomicFile. Throws IoError from the write that failed (set the
-/// stream's exceptions to badbit so that it passes through) and Cancelled when the caller asks to stop.
+/// Output side of a std::ostream over an AtomicFile. Bytes are written by a thread of their own while the
+/// next ones are gathered, unless `execution` has one thread. Throws IoError from a write after the one that
+/// failed (set the stream's exceptions to badbit so that it passes through) and Cancelled when the caller
+/// asks to stop.
 class AtomicFileBuffer : public std::streambuf {
   public:
-    AtomicFileBuffer(AtomicFile& file, const Execution& execution);
+    using Watch = std::function<void(std::span<const char>)>;
+    /// @param watch gets the bytes piece by piece, in the order in which they are written.
+    AtomicFileBuffer(AtomicFile& file, const Execution& execution, Watch watch = {});
+    /// Waits until all is written.
     void flushAll();
 
   protected:
@@ -72,12 +82,16 @@ class AtomicFileBuffer : public std::streambuf {
     std::streamsize xsputn(const char* s, std::streamsize n) override;
     int sync() override;
     pos_type seekoff(off_type offset, std::ios_base::seekdir direction, std::ios_base::openmode) override;
-    pos_type seekpos(pos_type position, std::ios_base::openmode) override;
+    pos_type seekpos(pos_type position, std::ios_base::openmode mode) override;
 
   private:
+    void handOver();
+
     AtomicFile* file_;
     const Execution* execution_;
-    std::vector<char> buffer_;
+    Watch watch_;
+    std::array<std::unique_ptr<char[]>, 2> pieces_;  // one is filled while the other is written
+    std::future<void> writing_;
     std::int64_t bufferStart_ = 0;  // offset in the file of the buffer's first byte
 };
 

@@ -3,12 +3,12 @@
 #include <openvdb/io/Compression.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <ostream>
+#include <span>
 #include <streambuf>
-#include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -21,69 +21,74 @@ namespace tessera {
 inline constexpr std::uint32_t kVdbCompression =
     openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK;
 
-/// Keeps what is written to it.
-class TextBuffer : public std::streambuf {
+/// Compresses the values of one leaf node after another, as OpenVDB does.
+class LeafPacker {
   public:
-    const std::string& bytes() const { return bytes_; }
+    LeafPacker() : stream_(&buffer_) { stream_.exceptions(std::ios_base::badbit | std::ios_base::failbit); }
 
-  protected:
-    std::streamsize xsputn(const char* s, std::streamsize n) override {
-        bytes_.append(s, std::size_t(n));
-        return n;
-    }
-    int_type overflow(int_type c) override {
-        if (!traits_type::eq_int_type(c, traits_type::eof())) bytes_ += traits_type::to_char_type(c);
-        return traits_type::not_eof(c);
-    }
-
-  private:
-    std::string bytes_;
-};
-
-/// A leaf node as it stands in the file: the mask of its active points, then its compressed values.
-class PackedLeaf {
-  public:
-    PackedLeaf() = default;
-    /// @param background the grid's.
-    template <class Leaf>
-    PackedLeaf(const Leaf& leaf, const typename Leaf::ValueType& background, bool toHalf) {
-        TextBuffer buffer;
-        std::ostream stream(&buffer);
-        stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);
-        openvdb::io::setDataCompression(stream, kVdbCompression);
-        openvdb::io::setGridBackgroundValuePtr(stream, &background);
-        leaf.writeBuffers(stream, toHalf);
-        size_ = buffer.bytes().size();
-        bytes_ = std::make_unique<char[]>(size_);
-        std::copy_n(buffer.bytes().data(), size_, bytes_.get());
-    }
-    void writeTo(std::ostream& stream) const { stream.write(bytes_.get(), std::streamsize(size_)); }
-
-    /// What precedes the values tells which inactive values there are
-    /// (openvdb::io::NO_MASK_OR_INACTIVE_VALS...).
-    std::int8_t kind() const { return std::int8_t(bytes_[kMaskBytes]); }
-    /// Bytes of the compressed values, their length included.
+    /// @param values of the active points, in the order of the leaf node.
+    /// @return valid until the next call.
     template <class Value>
-    std::int64_t valueBytes() const {
-        using namespace openvdb::io;
-        const bool two = kind() == MASK_AND_TWO_INACTIVE_VALS;
-        const bool one = kind() == NO_MASK_AND_ONE_INACTIVE_VAL || kind() == MASK_AND_ONE_INACTIVE_VAL;
-        const bool selects =
-            kind() == MASK_AND_NO_INACTIVE_VALS || kind() == MASK_AND_ONE_INACTIVE_VAL || two;
-        const std::size_t inactiveValues = two ? 2 : one ? 1 : 0;
-        const std::size_t head = kMaskBytes + 1 + inactiveValues * sizeof(Value) + (selects ? kMaskBytes : 0);
-        return std::int64_t(size_ - head);
+    std::span<const char> pack(std::span<const Value> values, bool toHalf) {
+        static_assert(sizeof(Value) <= kMostValueBytes);
+        buffer_.clear();
+        const auto count = openvdb::Index(values.size());
+        if (toHalf)
+            openvdb::io::HalfWriter<openvdb::io::RealToHalf<Value>::isReal, Value>::write(
+                stream_, values.data(), count, kVdbCompression);
+        else
+            openvdb::io::writeData(stream_, values.data(), count, kVdbCompression);
+        return buffer_.written();
     }
 
   private:
-    static constexpr std::size_t kMaskBytes = 64;
-    std::unique_ptr<char[]> bytes_;
-    std::size_t size_ = 0;
+    static constexpr std::size_t kMostValueBytes = 12;
+    class Buffer : public std::streambuf {
+      public:
+        void clear() { setp(bytes_.data(), bytes_.data() + bytes_.size()); }
+        std::span<const char> written() const { return {pbase(), pptr()}; }
+
+      private:
+        // Values that can't be compressed have a head.
+        std::array<char, openvdb::FloatTree::LeafNodeType::SIZE * kMostValueBytes + 64> bytes_;
+    };
+    Buffer buffer_;
+    std::ostream stream_;
 };
+
+/// The compressed values of a leaf node.
+class PackedValues {
+  public:
+    PackedValues() = default;
+    /// Copies them to memory that is given, or where that is too small to its own.
+    PackedValues(std::span<const char> packed, std::span<char> room) : size_(packed.size()) {
+        char* place = room.data();
+        if (room.size() < packed.size()) {
+            own_ = std::make_unique<char[]>(packed.size());
+            place = own_.get();
+        }
+        std::copy(packed.begin(), packed.end(), place);
+        bytes_ = place;
+    }
+    std::size_t size() const { return size_; }
+    void writeTo(std::ostream& stream) const { stream.write(bytes_, std::streamsize(size_)); }
+
+  private:
+    const char* bytes_ = nullptr;
+    std::size_t size_ = 0;
+    std::unique_ptr<char[]> own_;
+};
+
+/// What OpenVDB stores beside a grid that it writes: statistics and the compression.
+inline void describeStored(openvdb::GridBase& grid) {
+    grid.addStatsMetadata();
+    grid.insertMeta(openvdb::GridBase::META_FILE_COMPRESSION,
+                    openvdb::StringMetadata(openvdb::io::compressionToString(kVdbCompression)));
+}
 
 /// A grid of compressed leaf nodes: its tree has their masks and no values. Written, it gives the same bytes
-/// as OpenVDB's own grid, but each leaf node is compressed once, by the thread that made it, and memory is
-/// that of the file.
+/// as OpenVDB's own grid whose inactive points have the background, but each leaf node is compressed once, by
+/// the thread that made it.
 template <class Grid>
 class PackedGrid final : public Grid {
   public:
@@ -93,30 +98,27 @@ class PackedGrid final : public Grid {
     explicit PackedGrid(const typename Grid::ValueType& background)
         : Grid(std::make_shared<typename Grid::TreeType>(background)) {}
 
-    /// Takes a leaf node that was made for this grid's background and precision.
-    void add(std::unique_ptr<Leaf> maskOnly, PackedLeaf bytes) {
+    /// Takes a leaf node without values, and the values of its active points.
+    void add(std::unique_ptr<Leaf> maskOnly, PackedValues values) {
         maskOnly->setTransientData(openvdb::Index32(packed_.size()));
-        packed_.push_back(std::move(bytes));
+        packed_.push_back(std::move(values));
         this->tree().addLeaf(maskOnly.release());
     }
 
-    /// Adds what OpenVDB stores beside a grid it writes: statistics, and where values lie for delayed
-    /// loading.
+    /// Adds what OpenVDB stores beside a grid, and where values lie for delayed loading.
     void describe() {
-        this->addStatsMetadata();
+        describeStored(*this);
         const auto bytes = this->template getMetadata<openvdb::Int64Metadata>(Grid::META_FILE_MEM_BYTES);
-        if (bytes) bytes->value() += std::int64_t(packed_.size()) * bufferBytes();
-        this->insertMeta(Grid::META_FILE_COMPRESSION,
-                         openvdb::StringMetadata(openvdb::io::compressionToString(kVdbCompression)));
-        if (bufferBytes() == 0) return;
+        if (bytes)
+            bytes->value() +=
+                std::int64_t(packed_.size()) * Leaf::SIZE * std::int64_t(sizeof(typename Grid::ValueType));
         openvdb::io::DelayedLoadMetadata places;
         places.resizeMask(packed_.size());
         places.resizeCompressedSize(packed_.size());
         std::size_t i = 0;
         for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf, ++i) {
-            const PackedLeaf& packed = packed_[leaf->transientData()];
-            places.setMask(i, packed.kind());
-            places.setCompressedSize(i, packed.template valueBytes<typename Grid::ValueType>());
+            places.setMask(i, kKind);
+            places.setCompressedSize(i, std::int64_t(packed_[leaf->transientData()].size()));
         }
         this->insertMeta(Grid::META_FILE_DELAYED_LOAD, places);
     }
@@ -124,18 +126,17 @@ class PackedGrid final : public Grid {
     void writeBuffers(std::ostream& stream) const override {
         TESSERA_CHECK(openvdb::io::getDataCompression(stream) == kVdbCompression,
                       "the file is compressed as its leaf nodes are");
-        for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
+            leaf->valueMask().save(stream);
+            stream.put(kKind);
             packed_[leaf->transientData()].writeTo(stream);
+        }
     }
 
   private:
-    /// Bytes of a leaf node's values that its mask alone doesn't take.
-    static std::int64_t bufferBytes() {
-        return std::is_same_v<typename Grid::ValueType, bool>
-                   ? 0
-                   : std::int64_t(Leaf::SIZE * sizeof(typename Grid::ValueType));
-    }
-    std::vector<PackedLeaf> packed_;
+    /// Stands before the values of a leaf node: inactive points have the background.
+    static constexpr char kKind = openvdb::io::NO_MASK_OR_INACTIVE_VALS;
+    std::vector<PackedValues> packed_;
 };
 
 }  // namespace tessera

@@ -7,6 +7,9 @@
 #include <limits>
 #include <map>
 #include <ostream>
+#include <span>
+#include <sstream>
+#include <streambuf>
 #include <tuple>
 #include <utility>
 
@@ -69,16 +72,27 @@ openvdb::math::Transform::Ptr makeTransform(const BrickTree& tree, int level, do
 // 8^3 points of a grid: samples, points outside the mesh that carry a value, distances from the surface.
 struct GridTile {
     Vec3i origin{0};
-    const Tile* samples = nullptr;
-    const Tile* extension = nullptr;
-    const Tile* surface = nullptr;
+    Tile* samples = nullptr;
+    Tile* extension = nullptr;
+    Tile* surface = nullptr;
 };
 
+bool areFinite(const float* values) {
+    constexpr std::uint32_t kExponent = 0x7f800000;  // all ones: infinite or no number
+    std::uint32_t other = 0;
+    for (std::size_t i = 0; i < kTilePoints; ++i)
+        other |= std::uint32_t((std::bit_cast<std::uint32_t>(values[i]) & kExponent) == kExponent);
+    return other == 0;
+}
+
+using TileMask = std::array<std::uint64_t, 8>;
+
 // Bits of a tile where all given channels are finite.
-std::array<std::uint64_t, 8> finiteMask(const Tile& tile, int firstChannel, int components) {
-    std::array<std::uint64_t, 8> mask = tile.coverage;
+TileMask finiteMask(const Tile& tile, int firstChannel, int components) {
+    TileMask mask = tile.coverage;
     for (int c = firstChannel; c < firstChannel + components; ++c) {
         const float* values = tile.channel(c);
+        if (areFinite(values)) continue;
         for (std::size_t w = 0; w < 8; ++w) {
             std::uint64_t finite = 0;
             for (std::size_t b = 0; b < 64; ++b)
@@ -89,8 +103,23 @@ std::array<std::uint64_t, 8> finiteMask(const Tile& tile, int firstChannel, int 
     return mask;
 }
 
+bool isFull(const TileMask& mask) {
+    return std::all_of(mask.begin(), mask.end(), [](std::uint64_t word) { return ~word == 0; });
+}
+
+template <class Visit>
+void forEachIn(const TileMask& mask, const Visit& visit) {
+    if (isFull(mask)) {
+        for (std::size_t i = 0; i < kTilePoints; ++i) visit(i);
+        return;
+    }
+    for (std::size_t w = 0; w < 8; ++w)
+        for (std::uint64_t bits = mask[w]; bits != 0; bits &= bits - 1)
+            visit(w * 64 + std::size_t(std::countr_zero(bits)));
+}
+
 template <class Leaf>
-void setMask(Leaf& leaf, const std::array<std::uint64_t, 8>& words) {
+void setMask(Leaf& leaf, const TileMask& words) {
     for (openvdb::Index w = 0; w < 8; ++w)
         leaf.getValueMask().template getWord<openvdb::Index64>(w) |= words[w];
 }
@@ -103,8 +132,9 @@ class GridBuilder {
   public:
     virtual ~GridBuilder() = default;
     virtual void reserve(std::size_t tiles) = 0;
-    // Makes the leaf node of a tile of a batch; may be called for several at once.
-    virtual void makeLeaf(std::size_t position, const GridTile& tile) = 0;
+    // Makes the leaf node of a tile of a batch; may be called for several at once. Packed values may take the
+    // place of the tile's own.
+    virtual void makeLeaf(std::size_t position, const GridTile& tile, LeafPacker& packer) = 0;
     // Puts the leaf nodes made since into the tree.
     virtual void addLeaves() = 0;
     virtual openvdb::GridBase::Ptr grid() const = 0;
@@ -113,33 +143,50 @@ class GridBuilder {
 };
 
 template <class Grid>
-class BuilderOf : public GridBuilder {
+class ValueBuilder : public GridBuilder {
   public:
     using Leaf = typename Grid::TreeType::LeafNodeType;
-    BuilderOf(LeafForm form, const typename Grid::ValueType& background, bool toHalf)
-        : form_(form), grid_(std::make_shared<PackedGrid<Grid>>(background)) {
+    using Value = typename Grid::ValueType;
+    ValueBuilder(LeafForm form, const Value& background, bool toHalf)
+        : form_(form), toHalf_(toHalf), grid_(std::make_shared<PackedGrid<Grid>>(background)) {
         grid_->setSaveFloatAsHalf(toHalf);
     }
 
     void reserve(std::size_t tiles) override { made_.resize(tiles); }
-    void makeLeaf(std::size_t position, const GridTile& tile) override {
-        Leaf leaf(coord(tile.origin), grid_->background());
-        for (const Tile* part : partsOf(tile))
-            if (part) fill(leaf, *part);
-        if (leaf.isEmpty()) return;
+    void makeLeaf(std::size_t position, const GridTile& tile, LeafPacker& packer) override {
+        std::array<Value, kTilePoints> values;
+        TileMask mask{};
+        std::span<char> room;
+        for (Tile* part : partsOf(tile)) {
+            if (!part) continue;
+            const TileMask filled = fill(values, *part);
+            for (std::size_t w = 0; w < 8; ++w) mask[w] |= filled[w];
+            if (room.empty()) room = roomIn(*part);
+        }
+        if (mask == TileMask{}) return;
         if (form_ == LeafForm::plain) {
-            made_[position] = {std::make_unique<Leaf>(leaf), PackedLeaf()};
+            auto leaf = std::make_unique<Leaf>(coord(tile.origin), grid_->background());
+            Value* stored = leaf->buffer().data();
+            forEachIn(mask, [&](std::size_t i) { stored[i] = values[i]; });
+            setMask(*leaf, mask);
+            made_[position] = {std::move(leaf), PackedValues()};
             return;
         }
-        auto maskOnly = std::make_unique<Leaf>(openvdb::PartialCreate(), leaf.origin(), grid_->background());
-        maskOnly->setValueMask(leaf.getValueMask());
-        made_[position] = {std::move(maskOnly),
-                           PackedLeaf(leaf, grid_->background(), grid_->saveFloatAsHalf())};
+        auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), coord(tile.origin), grid_->background());
+        setMask(*leaf, mask);
+        std::size_t active = kTilePoints;
+        if (!isFull(mask)) {
+            active = 0;
+            forEachIn(mask, [&](std::size_t i) { values[active++] = values[i]; });
+        }
+        made_[position] = {
+            std::move(leaf),
+            PackedValues(packer.pack(std::span<const Value>(values.data(), active), toHalf_), room)};
     }
     void addLeaves() override {
-        for (auto& [leaf, bytes] : made_) {
+        for (auto& [leaf, values] : made_) {
             if (leaf && form_ == LeafForm::plain) grid_->tree().addLeaf(leaf.release());
-            if (leaf) grid_->add(std::move(leaf), std::move(bytes));
+            if (leaf) grid_->add(std::move(leaf), std::move(values));
         }
     }
     openvdb::GridBase::Ptr grid() const override { return grid_; }
@@ -148,87 +195,110 @@ class BuilderOf : public GridBuilder {
     }
 
   protected:
-    virtual void fill(Leaf& leaf, const Tile& tile) const = 0;
-    /// Null: none.
-    virtual std::array<const Tile*, 2> partsOf(const GridTile& tile) const {
+    // Values of the tile at points of its leaf node; returns which.
+    virtual TileMask fill(std::array<Value, kTilePoints>& values, const Tile& tile) const = 0;
+    // Where in a tile the values stand that nothing else needs once they are packed.
+    virtual std::span<char> roomIn(Tile& tile) const = 0;
+    // Null: none.
+    virtual std::array<Tile*, 2> partsOf(const GridTile& tile) const {
         return {tile.samples, tile.extension};
     }
 
   private:
     LeafForm form_;
+    bool toHalf_;
     std::shared_ptr<PackedGrid<Grid>> grid_;
-    std::vector<std::pair<std::unique_ptr<Leaf>, PackedLeaf>> made_;
+    std::vector<std::pair<std::unique_ptr<Leaf>, PackedValues>> made_;
 };
 
-class ScalarBuilder final : public BuilderOf<openvdb::FloatGrid> {
+std::span<char> roomOfChannels(Tile& tile, int firstChannel, int components) {
+    float* values = tile.values.get() + std::size_t(firstChannel) * kTilePoints;
+    return {reinterpret_cast<char*>(values), std::size_t(components) * kTilePoints * sizeof(float)};
+}
+
+class ScalarBuilder final : public ValueBuilder<openvdb::FloatGrid> {
   public:
     ScalarBuilder(LeafForm form, int channel, float background, bool toHalf)
-        : BuilderOf(form, background, toHalf), channel_(channel) {}
+        : ValueBuilder(form, background, toHalf), channel_(channel) {}
 
   private:
-    void fill(FloatLeaf& leaf, const Tile& tile) const override {
-        const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 1);
-        float* values = leaf.buffer().data();
+    TileMask fill(std::array<float, kTilePoints>& values, const Tile& tile) const override {
+        const TileMask mask = finiteMask(tile, channel_, 1);
         const float* from = tile.channel(channel_);
-        for (std::size_t i = 0; i < kTilePoints; ++i)
-            if (mask[i >> 6] >> (i & 63) & 1) values[i] = from[i];
-        setMask(leaf, mask);
+        forEachIn(mask, [&](std::size_t i) { values[i] = from[i]; });
+        return mask;
     }
+    std::span<char> roomIn(Tile& tile) const override { return roomOfChannels(tile, channel_, 1); }
 
     int channel_;
 };
 
-class VectorBuilder final : public BuilderOf<openvdb::Vec3SGrid> {
+class VectorBuilder final : public ValueBuilder<openvdb::Vec3SGrid> {
   public:
     VectorBuilder(LeafForm form, int channel, float background, bool toHalf, UpAxis upAxis)
-        : BuilderOf(form, openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
+        : ValueBuilder(form, openvdb::Vec3f(background), toHalf), channel_(channel), upAxis_(upAxis) {}
 
   private:
-    void fill(Vec3fLeaf& leaf, const Tile& tile) const override {
-        const std::array<std::uint64_t, 8> mask = finiteMask(tile, channel_, 3);
-        openvdb::Vec3f* values = leaf.buffer().data();
+    TileMask fill(std::array<openvdb::Vec3f, kTilePoints>& values, const Tile& tile) const override {
+        const TileMask mask = finiteMask(tile, channel_, 3);
         const float *x = tile.channel(channel_), *y = tile.channel(channel_ + 1),
                     *z = tile.channel(channel_ + 2);
-        for (std::size_t i = 0; i < kTilePoints; ++i)
-            if (mask[i >> 6] >> (i & 63) & 1) values[i] = turned(openvdb::Vec3f(x[i], y[i], z[i]), upAxis_);
-        setMask(leaf, mask);
+        forEachIn(mask,
+                  [&](std::size_t i) { values[i] = turned(openvdb::Vec3f(x[i], y[i], z[i]), upAxis_); });
+        return mask;
     }
+    std::span<char> roomIn(Tile& tile) const override { return roomOfChannels(tile, channel_, 3); }
 
     int channel_;
     UpAxis upAxis_;
 };
 
-class CoverageBuilder final : public BuilderOf<openvdb::BoolGrid> {
-  public:
-    explicit CoverageBuilder(LeafForm form) : BuilderOf(form, false, false) {}
-
-  private:
-    void fill(BoolLeaf& leaf, const Tile& tile) const override {
-        setMask(leaf, tile.coverage);
-        leaf.buffer() = BoolLeaf::Buffer(leaf.getValueMask());
-    }
-    std::array<const Tile*, 2> partsOf(const GridTile& tile) const override {
-        return {tile.samples, nullptr};
-    }
-};
-
-class SurfaceBuilder final : public BuilderOf<openvdb::FloatGrid> {
+class SurfaceBuilder final : public ValueBuilder<openvdb::FloatGrid> {
   public:
     explicit SurfaceBuilder(LeafForm form, double voxel)
-        : BuilderOf(form, float(kFarFromSurface * voxel), false), voxel_(voxel) {}
+        : ValueBuilder(form, float(kFarFromSurface * voxel), false), voxel_(voxel) {}
 
   private:
-    void fill(FloatLeaf& leaf, const Tile& tile) const override {
-        float* values = leaf.buffer().data();
-        for (int i = 0; i < kTilePoints; ++i)
-            if (tile.covered(i)) values[i] = float(-voxel_ * double(tile.channel(0)[i]));
-        setMask(leaf, tile.coverage);
+    TileMask fill(std::array<float, kTilePoints>& values, const Tile& tile) const override {
+        const float* voxels = tile.channel(0);
+        forEachIn(tile.coverage, [&](std::size_t i) { values[i] = float(-voxel_ * double(voxels[i])); });
+        return tile.coverage;
     }
-    std::array<const Tile*, 2> partsOf(const GridTile& tile) const override {
-        return {tile.surface, nullptr};
-    }
+    std::span<char> roomIn(Tile& tile) const override { return roomOfChannels(tile, 0, 1); }
+    std::array<Tile*, 2> partsOf(const GridTile& tile) const override { return {tile.surface, nullptr}; }
 
     double voxel_;  // in the file's unit
+};
+
+// Its leaf nodes are masks alone, in files too.
+class CoverageBuilder final : public GridBuilder {
+  public:
+    explicit CoverageBuilder(LeafForm form)
+        : form_(form),
+          grid_(std::make_shared<openvdb::BoolGrid>(std::make_shared<openvdb::BoolTree>(false))) {
+        grid_->setSaveFloatAsHalf(false);
+    }
+
+    void reserve(std::size_t tiles) override { made_.resize(tiles); }
+    void makeLeaf(std::size_t position, const GridTile& tile, LeafPacker&) override {
+        if (!tile.samples || tile.samples->empty()) return;
+        made_[position] = std::make_unique<BoolLeaf>(coord(tile.origin), false);
+        setMask(*made_[position], tile.samples->coverage);
+        made_[position]->buffer() = BoolLeaf::Buffer(made_[position]->getValueMask());
+    }
+    void addLeaves() override {
+        for (std::unique_ptr<BoolLeaf>& leaf : made_)
+            if (leaf) grid_->tree().addLeaf(leaf.release());
+    }
+    openvdb::GridBase::Ptr grid() const override { return grid_; }
+    void describe() override {
+        if (form_ == LeafForm::packed) describeStored(*grid_);
+    }
+
+  private:
+    LeafForm form_;
+    std::shared_ptr<openvdb::BoolGrid> grid_;
+    std::vector<std::unique_ptr<BoolLeaf>> made_;
 };
 
 // All grids of one level.
@@ -259,40 +329,34 @@ void addTiles(LevelGrids& grids, std::span<const GridTile> tiles, const Executio
     execution.throwIfCancelled();
     for (auto& builder : grids.builders) builder->reserve(tiles.size());
     parallelForChunks(execution, std::int64_t(tiles.size()), 64, [&](std::int64_t begin, std::int64_t end) {
-        for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i) {
-            for (auto& builder : grids.builders) builder->makeLeaf(i, tiles[i]);
-        }
+        LeafPacker packer;
+        for (std::size_t i = std::size_t(begin); i < std::size_t(end); ++i)
+            for (auto& builder : grids.builders) builder->makeLeaf(i, tiles[i], packer);
     });
     parallelFor(execution, std::int64_t(grids.builders.size()),
                 [&](std::int64_t b) { grids.builders[std::size_t(b)]->addLeaves(); });
 }
 
-const Tile* partAt(const TileMap& tiles, const TileKey& key) {
+Tile* partAt(TileMap& tiles, const TileKey& key) {
     const auto found = tiles.find(key);
     return found == tiles.end() ? nullptr : &found->second;
 }
 
-// The tiles of one level in batches; frees them on the way.
-void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& store,
+// The tiles of one level in batches. Packed leaf nodes may lie in them, plain ones leave nothing to keep.
+void addLevel(LevelGrids& grids, LeafForm form, const BrickTree& tree, BrickStore& store,
               const Execution& execution) {
     constexpr std::size_t kBatchTiles = 4096;
-    struct Place {
-        std::size_t leaf;
-        int tile;
-        GridTile grid;
-    };
-    const int n = store.tilesPerEdge();
-    std::vector<Place> places;
+    const int n = store.tilesPerEdge(), level = grids.level;
+    std::vector<GridTile> tiles;
     for (std::size_t leaf = 0; leaf < tree.leafCount(); ++leaf) {
         if (tree.leaves()[leaf].level != level) continue;
         const Vec3i first = tree.ownedPoints(tree.leaves()[leaf]).min;
         for (int t = 0; t < store.tileCount(); ++t) {
-            const Tile* tile = store.tile(leaf, t);
+            Tile* tile = store.tile(leaf, t);
             if (!tile) continue;
             const Vec3i origin = first + Vec3i(t / (n * n), t / n % n, t % n) * kTileSize;
             const TileKey key{level, floorDiv(origin, kTileSize)};
-            places.push_back(
-                {leaf, t, {origin, tile, partAt(store.extension(), key), partAt(store.surface(), key)}});
+            tiles.push_back({origin, tile, partAt(store.extension(), key), partAt(store.surface(), key)});
         }
     }
     // Tiles without samples.
@@ -301,25 +365,24 @@ void addLevel(LevelGrids& grids, int level, const BrickTree& tree, BrickStore& s
         const std::int64_t leaf = tree.findLeaf({level, brick});
         return leaf >= 0 && store.tile(std::size_t(leaf), (local.x * n + local.y) * n + local.z);
     };
-    const std::size_t withSamples = places.size();
-    for (const auto& [key, tile] : store.extension())
+    const std::size_t withSamples = tiles.size();
+    for (auto& [key, tile] : store.extension())
         if (key.level == level && !hasSamples(key.index))
-            places.push_back({0, -1, {key.index * kTileSize, nullptr, &tile, partAt(store.surface(), key)}});
-    for (const auto& [key, tile] : store.surface())
+            tiles.push_back({key.index * kTileSize, nullptr, &tile, partAt(store.surface(), key)});
+    for (auto& [key, tile] : store.surface())
         if (key.level == level && !hasSamples(key.index) && !partAt(store.extension(), key))
-            places.push_back({0, -1, {key.index * kTileSize, nullptr, nullptr, &tile}});
-    std::sort(places.begin() + std::ptrdiff_t(withSamples), places.end(), [](const Place& a, const Place& b) {
-        const Vec3i &p = a.grid.origin, &q = b.grid.origin;
-        return std::tie(p.z, p.y, p.x) < std::tie(q.z, q.y, q.x);
-    });
-    for (std::size_t begin = 0; begin < places.size(); begin += kBatchTiles) {
-        const std::size_t end = std::min(places.size(), begin + kBatchTiles);
-        execution.report(Stage::writing, std::int64_t(begin), std::int64_t(places.size()));
-        std::vector<GridTile> batch;
-        for (std::size_t i = begin; i < end; ++i) batch.push_back(places[i].grid);
-        addTiles(grids, batch, execution);
-        for (std::size_t i = begin; i < end; ++i)
-            if (places[i].tile >= 0) store.release(places[i].leaf, places[i].tile);
+            tiles.push_back({key.index * kTileSize, nullptr, nullptr, &tile});
+    std::sort(tiles.begin() + std::ptrdiff_t(withSamples), tiles.end(),
+              [](const GridTile& a, const GridTile& b) {
+                  const Vec3i &p = a.origin, &q = b.origin;
+                  return std::tie(p.z, p.y, p.x) < std::tie(q.z, q.y, q.x);
+              });
+    for (std::size_t begin = 0; begin < tiles.size(); begin += kBatchTiles) {
+        const std::size_t end = std::min(tiles.size(), begin + kBatchTiles);
+        execution.report(Stage::writing, std::int64_t(begin), std::int64_t(tiles.size()));
+        addTiles(grids, std::span(tiles).subspan(begin, end - begin), execution);
+        for (std::size_t i = begin; i < end && form == LeafForm::plain; ++i)
+            if (tiles[i].samples) *tiles[i].samples = Tile();
     }
 }
 
@@ -336,7 +399,7 @@ std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std
         if (!present[std::size_t(level)]) continue;
         const double voxel = hasSurface ? result.tree.spacingWorld(level) * unitScale : 0;
         LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, form, level, options, voxel));
-        addLevel(grids, level, result.tree, result.store, execution);
+        addLevel(grids, form, result.tree, result.store, execution);
     }
     if (all.empty()) all.push_back(makeBuilders(plans, toHalf, form, 0, options, 0));
     return all;
@@ -415,74 +478,108 @@ openvdb::GridPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std
     return ordered;
 }
 
+// Counts what is written to it.
+class CountingBuffer : public std::streambuf {
+  public:
+    std::int64_t count() const { return count_; }
+
+  protected:
+    std::streamsize xsputn(const char*, std::streamsize n) override {
+        count_ += n;
+        return n;
+    }
+    int_type overflow(int_type c) override {
+        ++count_;
+        return traits_type::not_eof(c);
+    }
+    pos_type seekoff(off_type, std::ios_base::seekdir, std::ios_base::openmode) override { return count_; }
+
+  private:
+    std::int64_t count_ = 0;
+};
+
 // OpenVDB's File hides failed writes, and its Archive compresses all leaf nodes to learn their sizes before
-// it compresses them to be written. This one writes to a stream of ours what grids bring.
+// it compresses them to be written. This one writes to a stream of ours what grids bring, from the first byte
+// to the last.
 class StreamArchive : public openvdb::io::Archive {
   public:
     StreamArchive() { setCompression(kVdbCompression); }
-    void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids,
-                 const openvdb::MetaMap& metadata) const {
-        writeHeader(stream, true);
+    void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
+                 const Execution& execution) const {
+        std::vector<GridSizes> sizes(grids.size());
+        parallelFor(execution, std::int64_t(grids.size()),
+                    [&](std::int64_t g) { sizes[std::size_t(g)] = measure(*grids[std::size_t(g)]); });
+        stream << headWithoutUuid();
         metadata.writeMeta(stream);
         const auto count = openvdb::Int32(grids.size());
         stream.write(reinterpret_cast<const char*>(&count), sizeof count);
-        for (const openvdb::GridBase::Ptr& grid : grids) writeGrid(stream, *grid);
+        for (std::size_t g = 0; g < grids.size(); ++g) writeGrid(stream, *grids[g], sizes[g]);
     }
 
   private:
-    void writeGrid(std::ostream& stream, const openvdb::GridBase& grid) const {
-        openvdb::io::GridDescriptor place(grid.getName(), grid.type(), grid.saveFloatAsHalf());
-        place.writeHeader(stream);
-        const std::streampos placesAt = stream.tellp();
-        place.writeStreamPos(stream);
-        place.setGridPos(stream.tellp());
+    // Bytes of a grid's parts in the file.
+    struct GridSizes {
+        std::int64_t topology = 0;  // and what precedes it
+        std::int64_t buffers = 0;
+    };
+
+    // OpenVDB draws a random UUID for every file.
+    std::string headWithoutUuid() const {
+        std::ostringstream stream;
+        writeHeader(stream, true);
+        return stream.str().replace(kUuidOffset, kUuidBytes, kUuidBytes, '0');
+    }
+
+    void writeTopology(std::ostream& stream, const openvdb::GridBase& grid) const {
         setGridCompression(stream, grid);
         grid.writeMeta(stream);
         grid.writeTransform(stream);
         grid.writeTopology(stream);
-        place.setBlockPos(stream.tellp());
+    }
+
+    GridSizes measure(const openvdb::GridBase& grid) const {
+        CountingBuffer counter;
+        std::ostream stream(&counter);
+        writeTopology(stream, grid);
+        const std::int64_t topology = counter.count();
         grid.writeBuffers(stream);
-        place.setEndPos(stream.tellp());
-        stream.seekp(placesAt);
+        return {topology, counter.count() - topology};
+    }
+
+    void writeGrid(std::ostream& stream, const openvdb::GridBase& grid, const GridSizes& sizes) const {
+        openvdb::io::GridDescriptor place(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+        place.writeHeader(stream);
+        const std::int64_t begin = std::int64_t(stream.tellp()) + 3 * std::int64_t(sizeof(std::int64_t));
+        place.setGridPos(begin);
+        place.setBlockPos(begin + sizes.topology);
+        place.setEndPos(begin + sizes.topology + sizes.buffers);
         place.writeStreamPos(stream);
-        place.seekToEnd(stream);
+        writeTopology(stream, grid);
+        grid.writeBuffers(stream);
+        TESSERA_CHECK(std::int64_t(stream.tellp()) == place.getEndPos(), "a grid is as long as was counted");
     }
 };
-
-// OpenVDB draws a random UUID for every file. Ours is the digest of all other bytes: equal content gives
-// equal files, and a reader can tell whether a file is damaged before it trusts it.
-void stampDigest(AtomicFile& file, const Execution& execution) {
-    std::array<char, kUuidBytes> blank;
-    blank.fill('0');
-    file.writeAt(kUuidOffset, blank.data(), blank.size());
-    FileDigest digest;
-    std::vector<char> bytes(std::size_t(1) << 20);
-    for (std::int64_t offset = 0; offset < file.size();) {
-        execution.throwIfCancelled();
-        const std::size_t got = file.readAt(offset, bytes.data(), bytes.size());
-        if (got == 0) throw IoError("can't read " + file.temporaryPath() + " back: it ends early");
-        digest.update(bytes.data(), got);
-        offset += std::int64_t(got);
-    }
-    const std::string uuid = digest.uuid();
-    file.writeAt(kUuidOffset, uuid.data(), uuid.size());
-}
 
 void writeFile(AtomicFile& file, const openvdb::GridPtrVec& grids,
                const std::map<std::string, std::string>& entries, const Execution& execution) {
     openvdb::MetaMap metadata;
     for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
     metadata.insertMeta("creator", openvdb::StringMetadata("Tessera " + entries.at("tessera_version")));
-    AtomicFileBuffer buffer(file, execution);
+    // The file's UUID is the digest of all other bytes: equal content gives equal files, and a reader can
+    // tell whether a file is damaged before it trusts it.
+    FileDigest digest;
+    AtomicFileBuffer buffer(file, execution,
+                            [&](std::span<const char> bytes) { digest.update(bytes.data(), bytes.size()); });
     std::ostream stream(&buffer);
     stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);
     try {
-        StreamArchive().writeTo(stream, grids, metadata);
+        StreamArchive().writeTo(stream, grids, metadata, execution);
         stream.flush();
     } catch (const openvdb::Exception& error) {
         throw IoError("can't write " + file.path() + ": " + error.what());
     }
-    stampDigest(file, execution);
+    const std::string uuid = digest.uuid();
+    file.writeAt(kUuidOffset, uuid.data(), uuid.size());
 }
 
 /// How far the file's transform puts the furthest sample from its place, in finest voxels. OpenVDB takes the
@@ -537,7 +634,7 @@ std::optional<BrickStatistics> statisticsOf(const std::vector<OutputField>& fiel
     return statistics;
 }
 
-// The grids of a file, in its order; frees the store's tiles.
+// The grids of a file, in its order. Packed ones lie in the store's tiles; plain ones free them.
 openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm form, BrickResult& result,
                               const VdbWriteOptions& options, VdbWriteResult& written,
                               const Execution& execution) {
@@ -554,6 +651,14 @@ openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm f
     const std::vector<LevelGrids> levels =
         buildGrids(plans, toHalf, form, result, options, written.unitScale, execution);
     return finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
+}
+
+void freeTiles(BrickStore& store, const Execution& execution) {
+    parallelForChunks(execution, std::int64_t(store.leafCount()), 64,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          for (auto leaf = std::size_t(begin); leaf < std::size_t(end); ++leaf)
+                              for (int t = 0; t < store.tileCount(); ++t) store.release(leaf, t);
+                      });
 }
 
 }  // namespace
@@ -589,17 +694,19 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
                         const VdbWriteOptions& options, const Execution& execution) {
     VdbWriteResult written;
     AtomicFile file(path);
-    // Making the grids frees the samples.
+    // Making the grids destroys the samples.
     std::optional<BrickStatistics> statistics = statisticsOf(fields, result, options, execution);
     const openvdb::GridPtrVec grids =
         makeGrids(fields, LeafForm::packed, result, options, written, execution);
     for (const openvdb::GridBase::Ptr& grid : grids)
-        written.activeVoxels += std::int64_t(grid->activeVoxelCount());
+        written.activeVoxels +=
+            std::int64_t(grid->metaValue<openvdb::Int64>(openvdb::GridBase::META_FILE_VOXEL_COUNT));
     VdbMetadata metadata = describeFile(fields, result, options, written.unitScale);
     metadata.statistics = std::move(statistics);
     writeFile(file, grids, encodeMetadata(metadata), execution);
     written.fileBytes = file.size();
     file.commit(execution);
+    freeTiles(result.store, execution);
     return written;
 }
 

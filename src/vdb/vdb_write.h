@@ -16,8 +16,8 @@ std::vector<bool> gridsInHalf(const std::vector<OutputField>& fields, const Bric
 void roundToHalf(const std::vector<OutputField>& fields, const std::vector<bool>& toHalf, BrickStore& store,
                  const Execution& execution);
 
-/// Writes the samples and their extension (layout: docs/vdb_layout.md) and frees the store's tiles on the
-/// way. In the flat layout the result comes from `flatten`. Nothing stands at `path` until the file is whole;
+/// Writes the samples and their extension (layout: docs/vdb_layout.md) and frees the store's tiles. In the
+/// flat layout the result comes from `flatten`. Nothing stands at `path` until the file is whole;
 /// "-" is standard output. Throws IoError (not writable, disk full), InputError (a unit that OpenVDB can't
 /// take, clashing names), Cancelled. The file depends on the arguments only: the same bytes for any number of
 /// threads.

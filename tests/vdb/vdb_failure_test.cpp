@@ -1,4 +1,6 @@
 #include <atomic>
+#include <ostream>
+#include <span>
 
 #include "files/atomic_file.h"
 #include "refine/brick_result.h"
@@ -63,6 +65,31 @@ TEST_F(VdbFailureTest, CancelledWriteLeavesNothing) {
     BrickResult result = makeResult({0, 0, 0}, 1, 8, nestedLeaves(), 1);
     EXPECT_THROW(writeVdb(file("out.vdb"), kScalar, result, {}, execution), Cancelled);
     EXPECT_EQ(fileCount(), 0u);
+}
+
+TEST_F(VdbFailureTest, StreamsWriteInOrderAndGoBack) {
+    std::string expected;
+    for (std::uint32_t i = 0; expected.size() < (std::size_t(5) << 20); ++i)
+        expected.append(i % 1000, char('a' + i % 26));
+    for (const int threads : {1, 2}) {
+        Execution execution;
+        execution.threads = threads;
+        AtomicFile out(file("out"));
+        std::string seen;
+        AtomicFileBuffer buffer(
+            out, execution, [&](std::span<const char> bytes) { seen.append(bytes.begin(), bytes.end()); });
+        std::ostream stream(&buffer);
+        for (std::size_t i = 0, at = 0; at < expected.size(); at += i++ * 1000)
+            stream << expected.substr(at, i * 1000);
+        stream.flush();
+        EXPECT_TRUE(seen == expected);
+        stream.seekp(3).write("back", 4);
+        stream.seekp(0, std::ios_base::end).put('!');
+        stream.flush();
+        ASSERT_TRUE(stream.good());
+        out.commit();
+        EXPECT_TRUE(readBytes(file("out")) == expected.substr(0, 3) + "back" + expected.substr(7) + "!");
+    }
 }
 
 TEST_F(VdbFailureTest, SymbolicLinkKeepsPointingAtTheFile) {

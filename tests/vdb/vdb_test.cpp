@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 
 #include "refine/brick_result.h"
 #include "refine/refine_options.h"
 #include "tessera/error.h"
+#include "vdb/packed_grid.h"
 #include "vdb/vdb_read.h"
 #include "vdb/vdb_write.h"
 #include "vdb_case.h"
@@ -197,6 +199,27 @@ float holed(int level, const Vec3i& p, int channel) {
 float holedAsRead(int level, const Vec3i& p, int channel) {
     if (p.x == 3 && channel >= 1 && channel <= 3) return kNaN;
     return holed(level, p, channel);
+}
+
+TEST_F(VdbFileTest, GridsHaveTheBytesThatOpenVdbWrites) {
+    for (const bool half : {false, true}) {
+        VdbWriteOptions options;
+        options.halfFloat = half;
+        options.background = 0.25f;
+        const auto make = [] { return makeResult({0, 0, 0}, 1, 16, nestedLeaves(), 10, holed, coveredAt); };
+        BrickResult packed = make(), plain = make();
+        writeVdb(file("out.vdb"), kMixed, packed, options, {});
+        const std::string bytes = readBytes(file("out.vdb"));
+        VdbWriteResult written;
+        for (const openvdb::GridBase::Ptr& grid : buildVdbGrids(kMixed, plain, options, written, {})) {
+            std::ostringstream stream;
+            openvdb::io::setDataCompression(stream, kVdbCompression);
+            const openvdb::GridBase::Ptr theirs = grid->deepCopyGrid();
+            theirs->writeTopology(stream);
+            theirs->writeBuffers(stream);
+            EXPECT_NE(bytes.find(stream.str()), std::string::npos) << grid->getName();
+        }
+    }
 }
 
 TEST_F(VdbFileTest, ValuesThatAreNotFiniteAreInactiveButCovered) {
