@@ -118,6 +118,13 @@ std::int32_t BrickTree::descend(const BrickKey& key, int& level) const {
     return entry;
 }
 
+BrickTree::Walk BrickTree::walk() const {
+    // Positions of entries are 32 bits too.
+    if (denseRoots_.empty() || inner_.size() > std::size_t(1) << 27) return {};
+    const std::int32_t* children = inner_.empty() ? nullptr : inner_.front().data();
+    return {denseRoots_.data(), children, rootMin_, rootSize_, rootShift()};
+}
+
 std::int64_t BrickTree::findLeaf(const BrickKey& key) const {
     int level = 0;
     const std::int32_t entry = descend(key, level);

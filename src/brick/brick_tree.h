@@ -70,12 +70,24 @@ class BrickTree {
     bool isRefined(const BrickKey& key) const;
     /// The leaf whose half-open box of cells contains the place, given in index space of level 0, or -1.
     std::int64_t findLeafAt(const Vec3d& index0) const {
-        constexpr double kLimit = 2147483647.0;
+        constexpr double kLimit = Walk::kLimit;
         if (!(std::abs(index0.x) < kLimit && std::abs(index0.y) < kLimit && std::abs(index0.z) < kLimit))
             return -1;
         const Vec3i p{floorToInt(index0.x), floorToInt(index0.y), floorToInt(index0.z)};
         return findLeafBy([&](int shift) { return p >> std::min(shift, 31); });
     }
+    /// What findLeafAt reads, for many places at once: entries of root bricks x first, then y, and eight
+    /// children of each inner brick. An entry is a leaf, kAbsent, or kFirstInner minus an inner brick's
+    /// position.
+    struct Walk {
+        static constexpr std::int32_t kAbsent = -1, kFirstInner = -2;
+        static constexpr double kLimit = 2147483647.0;  ///< no leaf holds a place as far away
+        const std::int32_t* roots = nullptr;            ///< null where they aren't laid out as a grid
+        const std::int32_t* children = nullptr;
+        Vec3i rootMin{0}, rootSize{0};
+        int rootShift = 0;  ///< from a point of level 0 to its root brick
+    };
+    Walk walk() const;
     /// Appends the leaves whose half-open boxes of cells meet a closed box given in index space of level 0.
     void findLeavesIn(const Box3d& index0, std::vector<std::size_t>& leaves) const;
     /// The leaf, of any level, whose half-open box contains lattice point `p` of `level`, or -1.
@@ -85,9 +97,14 @@ class BrickTree {
     // Children of an inner brick, child (x & 1) | (y & 1) << 1 | (z & 1) << 2. An entry is a leaf's position,
     // kAbsent, or an inner brick coded as innerEntry(position in inner_).
     using Children = std::array<std::int32_t, 8>;
-    static constexpr std::int32_t kAbsent = -1;
-    static constexpr std::int32_t innerEntry(std::size_t position) { return -2 - std::int32_t(position); }
-    static constexpr std::size_t innerPosition(std::int32_t entry) { return std::size_t(-2 - entry); }
+    static constexpr std::int32_t kAbsent = Walk::kAbsent;
+    static constexpr std::int32_t innerEntry(std::size_t position) {
+        return Walk::kFirstInner - std::int32_t(position);
+    }
+    static constexpr std::size_t innerPosition(std::int32_t entry) {
+        return std::size_t(Walk::kFirstInner - entry);
+    }
+    int rootShift() const { return std::countr_zero(unsigned(brickCells_)) + levelCount_ - 1; }
 
     void findIn(std::int32_t entry, int level, const Vec3i& index, const Box3d& index0,
                 std::vector<std::size_t>& leaves) const;
@@ -112,7 +129,7 @@ class BrickTree {
     template <class Shifted>
     std::int64_t findLeafBy(const Shifted& shifted) const {
         if (levelCount_ == 0) return -1;
-        int shift = std::countr_zero(unsigned(brickCells_)) + levelCount_ - 1;
+        int shift = rootShift();
         std::int32_t entry = rootEntry(shifted(shift));
         while (entry < kAbsent) entry = inner_[innerPosition(entry)][childOf(shifted(--shift))];
         return entry;

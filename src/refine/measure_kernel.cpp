@@ -1,5 +1,7 @@
 #include "refine/measure_kernel.h"
 
+#include <algorithm>
+#include <cstring>
 #include <limits>
 
 #include "base/vector_targets.h"
@@ -31,8 +33,18 @@ HWY_INLINE void store(V v, LaneInts& lanes, std::size_t i) {
 HWY_INLINE V set(double value) {
     return hn::Set(D(), value);
 }
-HWY_INLINE auto isKept(const MeasureBatch& batch, std::size_t i) {
-    return hn::Gt(load(batch.isKept, i), hn::Zero(D()));
+template <class Tag>
+HWY_INLINE auto maskOf(Tag tag, LaneBits bits, std::size_t i) {
+    const LaneBits ofVector = bits >> i;
+    std::uint8_t bytes[sizeof ofVector];
+    std::memcpy(bytes, &ofVector, sizeof ofVector);
+    return hn::LoadMaskBits(tag, bytes);
+}
+template <class Tag, class Mask>
+HWY_INLINE LaneBits bitsOf(Tag tag, Mask mask, std::size_t i) {
+    std::uint8_t bytes[sizeof(LaneBits)] = {};
+    hn::StoreMaskBits(tag, mask, bytes);
+    return LaneBits(bytes[0]) << i;
 }
 HWY_INLINE auto isFinite(V v) {
     return hn::Le(hn::Abs(v), set(std::numeric_limits<double>::max()));
@@ -47,13 +59,33 @@ HWY_INLINE void add(V v, LaneSums& sums, std::size_t i) {
     hn::Store(hn::Add(hn::Load(D(), lanes), v), D(), lanes);
 }
 
-// As sixfoldVolume and SampledMesh::centroidWorld.
-void placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& originWorld) {
+HWY_INLINE void load(const Quad* quads, std::size_t i, V (&v)[4]) {
+    hn::LoadInterleaved4(D(), quads[i].number.data(), v[0], v[1], v[2], v[3]);
+}
+
+void gatherNodes(MeasureBatch& batch, const Quad* nodes) {
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i)
+        for (std::size_t k = 0; k < 4; ++k) batch.node[k][i] = nodes[batch.tet[i][k]];
+}
+
+void placeNodes(MeasureBatch& batch, const Vec3d& originWorld, LaneDoubles& values) {
     forVectors(batch, [&](std::size_t i) {
-        V u[3], v[3], w[3];
+        V p[4];
+        load(batch.node[0], i, p);
+        for (std::size_t a = 0; a < 3; ++a) store(hn::Sub(p[a], set(originWorld[int(a)])), batch.place[a], i);
+        store(p[3], values, i);
+    });
+}
+
+// As sixfoldVolume, SampledMesh::centroidWorld and SampledMesh::exactValue.
+ElementSigns placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& originWorld,
+                           LaneDoubles& values) {
+    ElementSigns signs{0, 0};
+    forVectors(batch, [&](std::size_t i) {
+        V node[4][4], u[3], v[3], w[3];
+        for (std::size_t k = 0; k < 4; ++k) load(batch.node[k], i, node[k]);
         for (std::size_t a = 0; a < 3; ++a) {
-            const V p0 = load(batch.nodeWorld[0][a], i), p1 = load(batch.nodeWorld[1][a], i),
-                    p2 = load(batch.nodeWorld[2][a], i), p3 = load(batch.nodeWorld[3][a], i);
+            const V p0 = node[0][a], p1 = node[1][a], p2 = node[2][a], p3 = node[3][a];
             u[a] = hn::Sub(p1, p0);
             v[a] = hn::Sub(p2, p0);
             w[a] = hn::Sub(p3, p0);
@@ -74,19 +106,70 @@ void placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& ori
         const V bound = hn::Add(hn::Mul(set(10 * 0x1p-53), sum),
                                 hn::Mul(set(0x1p-1000), hn::Add(hn::Add(hn::Add(wx, wy), wz), set(1))));
         store(volume, batch.sixfold, i);
-        store(hn::IfThenElseZero(hn::Gt(hn::Abs(volume), bound), set(1)), batch.isCertain, i);
+        // Not a number isn't certain either.
+        signs.uncertain |= bitsOf(D(), hn::Not(hn::Gt(hn::Abs(volume), bound)), i);
+        signs.negative |= bitsOf(D(), hn::Lt(volume, hn::Zero(D())), i);
         const V size = hn::Div(hn::Abs(volume), set(6));
         const V least = set(std::numeric_limits<double>::denorm_min());
         store(hn::IfThenElse(hn::Lt(size, least), least, size), batch.volume, i);
+        store(hn::Mul(set(0.25), hn::Add(hn::Add(hn::Add(node[0][3], node[1][3]), node[2][3]), node[3][3])),
+              values, i);
     });
+    signs.uncertain &= batch.lanes();
+    signs.negative &= batch.lanes() & ~signs.uncertain;
+    return signs;
+}
+
+LaneBits findLeaves(MeasureBatch& batch, const BrickTree::Walk& walk, double inverseSpacing0,
+                    const Box3d& bounds) {
+    using I = hn::VFromD<Ints>;
+    const Ints ints;
+    const I zero = hn::Zero(ints), absent = hn::Set(ints, BrickTree::Walk::kAbsent);
+    const V limit = set(BrickTree::Walk::kLimit);
+    LaneBits found = 0;
+    forVectors(batch, [&](std::size_t i) {
+        I point[3], root = zero;
+        auto isInside = hn::Eq(limit, limit);
+        auto isRoot = hn::Eq(zero, zero);
+        for (std::size_t a = 3; a-- > 0;) {
+            const V place = load(batch.place[a], i), index0 = hn::Mul(place, set(inverseSpacing0));
+            isInside = hn::And(isInside, hn::And(hn::Ge(place, set(bounds.min[int(a)])),
+                                                 hn::Le(place, set(bounds.max[int(a)]))));
+            isInside = hn::And(isInside, hn::Lt(hn::Abs(index0), limit));
+            point[a] = hn::DemoteTo(ints, hn::Floor(index0));
+            const I size = hn::Set(ints, walk.rootSize[int(a)]);
+            const I ofRoot = hn::Sub(hn::ShiftRightSame(point[a], std::min(walk.rootShift, 31)),
+                                     hn::Set(ints, walk.rootMin[int(a)]));
+            isRoot = hn::And(isRoot, hn::And(hn::Gt(ofRoot, hn::Set(ints, -1)), hn::Lt(ofRoot, size)));
+            root = hn::Add(hn::Mul(root, size), ofRoot);
+        }
+        I entry = hn::IfThenElse(isRoot, hn::GatherIndex(ints, walk.roots, hn::IfThenElseZero(isRoot, root)),
+                                 absent);
+        for (int shift = walk.rootShift - 1;; --shift) {
+            const auto isInner = hn::Lt(entry, absent);
+            if (hn::AllFalse(ints, isInner)) break;
+            I child = hn::ShiftLeft<3>(hn::Sub(hn::Set(ints, BrickTree::Walk::kFirstInner), entry));
+            for (int a = 0; a < 3; ++a)
+                child = hn::Add(
+                    child,
+                    hn::ShiftLeftSame(
+                        hn::And(hn::ShiftRightSame(point[a], std::min(shift, 31)), hn::Set(ints, 1)), a));
+            entry = hn::IfThenElse(
+                isInner, hn::GatherIndex(ints, walk.children, hn::IfThenElseZero(isInner, child)), entry);
+        }
+        hn::Store(entry, ints, batch.leaf.lane + i);
+        found |= bitsOf(D(), isInside, i) & bitsOf(ints, hn::Gt(entry, absent), i);
+    });
+    return found & batch.lanes();
 }
 
 void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
     const V last = set(brickCells - 1), edge = set(tilesPerEdge), eight = set(8);
     forVectors(batch, [&](std::size_t i) {
-        V tile = hn::Zero(D()), offset = hn::Zero(D()), beyond = hn::Zero(D()), least = last;
+        V tile = hn::Zero(D()), offset = hn::Zero(D()), beyond = hn::Zero(D()), least = last, frame[4];
+        load(batch.frame, i, frame);
         for (std::size_t a = 0; a < 3; ++a) {
-            const V local = load(batch.local[a], i);
+            const V local = hn::Sub(hn::Mul(load(batch.place[a], i), frame[3]), frame[a]);
             const V cell = hn::Floor(hn::Min(hn::Max(local, hn::Zero(D())), last));
             const V t = hn::Sub(local, cell);
             store(hn::IfThenElse(hn::Gt(t, set(1 - kOnLatticePlane)), set(1),
@@ -106,11 +189,14 @@ void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
     });
 }
 
-void addDifference(const MeasureBatch& batch, const LaneFloats (&corners)[8], const LaneDoubles& exact,
+void addDifference(const MeasureBatch& batch, const LaneCorners& corners, const LaneDoubles& exact,
                    bool isSquared, LaneDoubles& sum) {
     const V one = set(1);
     forVectors(batch, [&](std::size_t i) {
         V weight[3][2];
+        hn::VFromD<Floats> corner[8];
+        for (std::size_t row = 0; row < 4; ++row)
+            hn::LoadInterleaved2(Floats(), corners.row[row].data() + 2 * i, corner[row], corner[row + 4]);
         for (std::size_t a = 0; a < 3; ++a) {
             weight[a][1] = load(batch.fraction[a], i);
             weight[a][0] = hn::Sub(one, weight[a][1]);
@@ -118,8 +204,7 @@ void addDifference(const MeasureBatch& batch, const LaneFloats (&corners)[8], co
         V value = hn::Zero(D());
         for (std::size_t c = 0; c < 8; ++c) {
             const V w = hn::Mul(hn::Mul(weight[0][c & 1], weight[1][c >> 1 & 1]), weight[2][c >> 2]);
-            const V corner = hn::PromoteTo(D(), hn::Load(Floats(), corners[c].lane + i));
-            value = hn::Add(value, hn::Mul(w, corner));
+            value = hn::Add(value, hn::Mul(w, hn::PromoteTo(D(), corner[c])));
         }
         const V difference = hn::Sub(value, load(exact, i));
         const V part = isSquared ? hn::Mul(difference, difference) : hn::Abs(difference);
@@ -128,19 +213,22 @@ void addDifference(const MeasureBatch& batch, const LaneFloats (&corners)[8], co
 }
 
 void finishErrors(MeasureBatch& batch, bool isSquared, LaneDoubles& sum) {
+    LaneBits finite = 0;
     forVectors(batch, [&](std::size_t i) {
         const V error = isSquared ? hn::Sqrt(load(sum, i)) : load(sum, i);
         store(error, sum, i);
-        store(hn::IfThenElseZero(isFinite(error), load(batch.isKept, i)), batch.isKept, i);
+        finite |= bitsOf(D(), isFinite(error), i);
     });
+    batch.kept &= finite;
 }
 
 double listErrors(const MeasureBatch& batch, const LaneDoubles& errors, double unit, LaneFloats& listed) {
     V largest = set(-1);
     forVectors(batch, [&](std::size_t i) {
-        const V error = hn::IfThenElse(isKept(batch, i), load(errors, i), set(-1));
+        const auto isKept = maskOf(D(), batch.kept, i);
+        const V error = hn::IfThenElse(isKept, load(errors, i), set(-1));
         largest = hn::Max(largest, error);
-        const V share = hn::IfThenElse(isKept(batch, i), hn::Div(error, set(unit)), set(-1));
+        const V share = hn::IfThenElse(isKept, hn::Div(error, set(unit)), set(-1));
         hn::Store(hn::DemoteTo(Floats(), share), Floats(), listed.lane + i);
     });
     return hn::GetLane(hn::MaxOfLanes(D(), largest));
@@ -157,6 +245,25 @@ void addSquares(const MeasureBatch& batch, const LaneFloats& listed, double shar
     });
 }
 
+void addNodeSquares(const MeasureBatch& batch, const float* listed, double share, SquareSums& sums) {
+    const V zero = hn::Zero(D()), one = set(1);
+    forVectors(batch, [&](std::size_t i) {
+        hn::VFromD<Ints> node[4];
+        hn::LoadInterleaved4(Ints(), batch.tet[i].data(), node[0], node[1], node[2], node[3]);
+        V square = zero, number = zero;
+        for (const auto& ofNode : node) {
+            const V error = hn::PromoteTo(D(), hn::GatherIndex(Floats(), listed, ofNode));
+            const auto isMeasured = hn::Ge(error, zero);
+            square = hn::Add(square, hn::IfThenElseZero(isMeasured, hn::Mul(error, error)));
+            number = hn::Add(number, hn::IfThenElseZero(isMeasured, one));
+        }
+        const V weight = hn::Mul(set(share), load(batch.volume, i));
+        const auto counts = hn::And(hn::Gt(weight, zero), hn::Gt(number, zero));
+        add(hn::IfThenElseZero(counts, hn::Mul(weight, square)), sums.squares, i);
+        add(hn::IfThenElseZero(counts, hn::Mul(weight, number)), sums.weights, i);
+    });
+}
+
 void addIntegral(const MeasureBatch& batch, const LaneDoubles& values, LaneSums& sums) {
     forVectors(batch, [&](std::size_t i) {
         const V value = load(values, i);
@@ -170,21 +277,36 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace tessera::measure {
 
+HWY_EXPORT(gatherNodes);
+HWY_EXPORT(placeNodes);
 HWY_EXPORT(placeElements);
+HWY_EXPORT(findLeaves);
 HWY_EXPORT(locateCells);
 HWY_EXPORT(addDifference);
 HWY_EXPORT(finishErrors);
 HWY_EXPORT(listErrors);
 HWY_EXPORT(addSquares);
+HWY_EXPORT(addNodeSquares);
 HWY_EXPORT(addIntegral);
 
-void placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& originWorld) {
-    HWY_DYNAMIC_DISPATCH(placeElements)(batch, reference, originWorld);
+void gatherNodes(MeasureBatch& batch, const Quad* nodes) {
+    HWY_DYNAMIC_DISPATCH(gatherNodes)(batch, nodes);
+}
+void placeNodes(MeasureBatch& batch, const Vec3d& originWorld, LaneDoubles& values) {
+    HWY_DYNAMIC_DISPATCH(placeNodes)(batch, originWorld, values);
+}
+ElementSigns placeElements(MeasureBatch& batch, const Vec3d& reference, const Vec3d& originWorld,
+                           LaneDoubles& values) {
+    return HWY_DYNAMIC_DISPATCH(placeElements)(batch, reference, originWorld, values);
+}
+LaneBits findLeaves(MeasureBatch& batch, const BrickTree::Walk& walk, double inverseSpacing0,
+                    const Box3d& bounds) {
+    return HWY_DYNAMIC_DISPATCH(findLeaves)(batch, walk, inverseSpacing0, bounds);
 }
 void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
     HWY_DYNAMIC_DISPATCH(locateCells)(batch, brickCells, tilesPerEdge);
 }
-void addDifference(const MeasureBatch& batch, const LaneFloats (&corners)[8], const LaneDoubles& exact,
+void addDifference(const MeasureBatch& batch, const LaneCorners& corners, const LaneDoubles& exact,
                    bool isSquared, LaneDoubles& sum) {
     HWY_DYNAMIC_DISPATCH(addDifference)(batch, corners, exact, isSquared, sum);
 }
@@ -196,6 +318,9 @@ double listErrors(const MeasureBatch& batch, const LaneDoubles& errors, double u
 }
 void addSquares(const MeasureBatch& batch, const LaneFloats& listed, double share, SquareSums& sums) {
     HWY_DYNAMIC_DISPATCH(addSquares)(batch, listed, share, sums);
+}
+void addNodeSquares(const MeasureBatch& batch, const float* listed, double share, SquareSums& sums) {
+    HWY_DYNAMIC_DISPATCH(addNodeSquares)(batch, listed, share, sums);
 }
 void addIntegral(const MeasureBatch& batch, const LaneDoubles& values, LaneSums& sums) {
     HWY_DYNAMIC_DISPATCH(addIntegral)(batch, values, sums);

@@ -19,6 +19,12 @@ class NodeSet {
     explicit NodeSet(std::size_t nodes) : words_((nodes + 63) / 64, 0) {}
 
     bool contains(std::size_t node) const { return words_[node / 64] >> node % 64 & 1; }
+    /// Whether it has the first so many.
+    bool containsAll(std::size_t nodes) const {
+        for (std::size_t node = 0; node < nodes; ++node)
+            if (!contains(node)) return false;
+        return true;
+    }
     /// Several threads may insert at once.
     void insert(const std::array<std::int32_t, 4>& tet) {
         for (const std::int32_t node : tet) {
