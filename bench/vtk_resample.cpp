@@ -46,4 +46,14 @@ std::string VtkResample::backend() const {
     return vtkSMPTools::GetBackend();
 }
 
+double readByVtk(const std::string& path) {
+    vtkNew<vtkXMLUnstructuredGridReader> reader;
+    reader->SetFileName(path.c_str());
+    const auto start = std::chrono::steady_clock::now();
+    reader->Update();
+    const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
+    if (reader->GetOutput()->GetNumberOfCells() == 0) throw std::runtime_error(path + ": VTK read no cells");
+    return elapsed.count();
+}
+
 }  // namespace tessera::bench

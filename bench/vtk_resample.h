@@ -21,4 +21,7 @@ class VtkResample {
     std::unique_ptr<Impl> impl_;
 };
 
+/// Reads a .vtu file by VTK's reader, which uses one thread; returns milliseconds. Throws std::runtime_error.
+double readByVtk(const std::string& path);
+
 }  // namespace tessera::bench

@@ -31,6 +31,7 @@ if(TESSERA_BUILD_IO)
   find_package(PNG REQUIRED)
   find_package(ZLIB REQUIRED)
   pkg_check_modules(TESSERA_LZ4 REQUIRED IMPORTED_TARGET liblz4)
+  pkg_check_modules(TESSERA_DEFLATE REQUIRED IMPORTED_TARGET libdeflate)
   pkg_check_modules(SECCOMP IMPORTED_TARGET libseccomp)  # without it the process that reads files has no filter
   find_package(nlohmann_json REQUIRED)
   find_package(CLI11 REQUIRED)

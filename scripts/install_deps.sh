@@ -4,7 +4,7 @@ set -euo pipefail
 
 packages=(
   g++ clang-14 libclang-rt-14-dev llvm-14 cmake ninja-build ccache pkg-config git ca-certificates
-  libvtk9-dev libopenvdb-dev libnanovdb-dev libopenvdb-tools libopenexr-dev openexr libtbb-dev libblosc-dev liblz4-dev libpng-dev zlib1g-dev
+  libvtk9-dev libopenvdb-dev libnanovdb-dev libopenvdb-tools libopenexr-dev openexr libtbb-dev libblosc-dev liblz4-dev libpng-dev zlib1g-dev libdeflate-dev
   libglm-dev libgmp-dev libhwy-dev libcli11-dev nlohmann-json3-dev libfmt-dev libmimalloc-dev libseccomp-dev
   libgl-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6
   libglfw3-dev libimgui-dev libstb-dev xvfb openbox xdotool

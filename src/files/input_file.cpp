@@ -69,6 +69,10 @@ InputFile::~InputFile() {
     ::close(descriptor_);
 }
 
+void InputFile::read(std::size_t at, std::span<char> bytes) const {
+    readAt(descriptor_, path_, at, bytes.data(), bytes.size());
+}
+
 void InputFile::fill(std::size_t at, std::size_t count) {
     piece_.resize(count);
     pieceAt_ = at;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,10 @@ class InputFile {
     std::string_view bytesFrom(std::size_t at, std::size_t least = 1);
     /// `count` bytes from `at`, fewer only at the file's end.
     std::string copy(std::size_t at, std::size_t count);
+
+    /// Fills `bytes` from `at`. Throws InputError where the file ends before. May be called from several
+    /// threads at once.
+    void read(std::size_t at, std::span<char> bytes) const;
 
     /// As those of std::string_view.
     std::size_t find(std::string_view word, std::size_t from);

@@ -44,7 +44,13 @@ void forEachNode(CellKind kind, Nodes nodes, std::int64_t count, const Visit& vi
 }
 
 template <class Visit>
-void forEachNode(CellList& cells, const Execution& execution, const Visit& visit) {
+void forEachNode(RawBlock& block, const Execution& execution, const Visit& visit) {
+    parallelForChunks(execution, std::int64_t(block.tets.size()), kAssembleChunk,
+                      [&](std::int64_t begin, std::int64_t end) {
+                          for (auto e = std::size_t(begin); e < std::size_t(end); ++e)
+                              for (std::int32_t& node : block.tets[e]) visit(node);
+                      });
+    CellList& cells = block.cells;
     parallelForChunks(execution, cells.cellCount(), kAssembleChunk,
                       [&](std::int64_t begin, std::int64_t end) {
                           for (std::int64_t c = begin; c < end; ++c) {
@@ -68,7 +74,7 @@ void keepOnly(const std::vector<std::int32_t>& kept, std::vector<Item>& items) {
 std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& block, std::size_t blockIndex,
                                           std::size_t blockCount, const Execution& execution) {
     std::vector<std::int32_t> newIndex(block.points.size(), -1);
-    forEachNode(block.cells, execution, [&](std::int32_t node) {
+    forEachNode(block, execution, [&](std::int32_t node) {
         std::atomic_ref(newIndex[std::size_t(node)]).store(0, std::memory_order_relaxed);
     });
     std::vector<std::int32_t> kept;
@@ -84,7 +90,7 @@ std::vector<std::int32_t> dropUnusedNodes(const std::string& path, RawBlock& blo
         kept.push_back(std::int32_t(i));
     }
     if (kept.size() == block.points.size()) return {};
-    forEachNode(block.cells, execution, [&](std::int32_t& node) { node = newIndex[std::size_t(node)]; });
+    forEachNode(block, execution, [&](std::int32_t& node) { node = newIndex[std::size_t(node)]; });
     keepOnly(kept, block.points);
     if (!block.nodeIds.empty()) keepOnly(kept, block.nodeIds);
     return kept;
@@ -153,7 +159,7 @@ void joinAcrossParts(RawBlock& all, const std::vector<std::size_t>& firstPoint, 
                                       " nodes on borders of parts have other values there than in the part "
                                       "beside; they stay nodes of their own.");
     if (joined.kept.size() == all.points.size()) return;
-    forEachNode(all.cells, execution, [&](std::int32_t& node) { node = joined.newIndex[std::size_t(node)]; });
+    forEachNode(all, execution, [&](std::int32_t& node) { node = joined.newIndex[std::size_t(node)]; });
     keepOnly(joined.kept, all.points);
     for (Field& field : all.fields)
         if (field.location == FieldLocation::point) gatherTuples(field, joined.kept, execution);
@@ -166,6 +172,12 @@ void warnOfFields(const std::vector<std::string>& names, const std::string& what
     if (names.size() > 1)
         statistics.warnings.push_back(std::to_string(names.size()) + " fields are " + what + ": " +
                                       nameList(names) + ".");
+}
+
+/// Makes cells of a block's tetrahedra.
+void listCells(RawBlock& block) {
+    for (const std::array<std::int32_t, 4>& tet : block.tets) block.cells.add(CellKind::tet, tet.data(), 4);
+    block.tets = {};
 }
 
 /// One block with points, cells and fields of all; cell fields have one tuple for every listed cell.
@@ -187,7 +199,7 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const ReadOptions& o
                 gatherTuples(field, block.sourceCell, execution);
         }
         points += block.points.size();
-        cells += block.cells.kinds.size();
+        cells += std::size_t(block.cellCount());
     }
     if (points > std::size_t(std::numeric_limits<std::int32_t>::max()))
         throw InputError(meshName(path, options) + ": has " + std::to_string(points) +
@@ -208,7 +220,8 @@ RawBlock mergeBlocks(const std::string& path, RawMesh& raw, const ReadOptions& o
     for (std::size_t b = 0; b < raw.blocks.size(); ++b) {
         RawBlock& block = raw.blocks[b];
         const std::vector<std::int32_t> index = std::move(indices[b]);
-        forEachNode(block.cells, execution, [&](std::int32_t& node) { node = index[std::size_t(node)]; });
+        forEachNode(block, execution, [&](std::int32_t& node) { node = index[std::size_t(node)]; });
+        listCells(block);
         for (std::size_t i = 0; i < index.size(); ++i) all.points[std::size_t(index[i])] = block.points[i];
         all.cells.kinds.insert(all.cells.kinds.end(), block.cells.kinds.begin(), block.cells.kinds.end());
         const auto nodeBase = std::int64_t(all.cells.nodes.size());
@@ -393,7 +406,8 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     statistics.blocks = std::int64_t(raw.blocks.size());
     statistics.cells = 0;
     for (const RawBlock& block : raw.blocks) {
-        statistics.cells += block.cells.cellCount();
+        statistics.cells += block.cellCount();
+        statistics.cellsOfKind[std::size_t(CellKind::tet)] += std::int64_t(block.tets.size());
         for (const CellKind kind : block.cells.kinds) ++statistics.cellsOfKind[std::size_t(kind)];
     }
     if (statistics.cells == 0)
@@ -406,8 +420,12 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
     warnSkippedArrays(block, statistics);
 
     MeshFile file;
-    const bool pureTets = isPureTets(block.cells);
-    SplitCells split = splitCells(block.points, block.cells, execution);
+    const bool pureTets = isPureTets(block.cells), isSplit = !block.tets.empty();
+    SplitCells split;
+    if (isSplit)
+        split.tets = std::move(block.tets);
+    else
+        split = splitCells(block.points, block.cells, execution);
     if (std::int64_t(split.tets.size()) >= (std::int64_t(1) << 30))
         throw InputError(name + ": gives " + std::to_string(split.tets.size()) +
                          " tetrahedra; fewer than 2^30 are possible");
@@ -419,7 +437,7 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
         file.mesh.points.push_back(node.point);
     }
     statistics.addedNodes = std::int64_t(split.addedNodes.size());
-    const bool everyCellIsItsTet = pureTets && split.tets.size() == block.cells.kinds.size();
+    const bool everyCellIsItsTet = isSplit || (pureTets && split.tets.size() == block.cells.kinds.size());
     for (Field& field : block.fields) {
         if (field.location == FieldLocation::point)
             extendPointField(field, split.addedNodes);

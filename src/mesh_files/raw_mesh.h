@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -24,11 +25,15 @@ struct RawBlock {
     /// the file's number of every point, where blocks share points; else empty
     std::vector<std::int64_t> nodeIds;
     CellList cells;  ///< 3D cells that take part; node indices and face streams are checked
+    /// In place of `cells`, where every cell of the block is a tetrahedron of four different nodes.
+    std::vector<std::array<std::int32_t, 4>> tets;
     /// position of each of these cells in the block; empty when it is the same
     std::vector<std::int64_t> sourceCell;
     std::int64_t sourceCells = 0;   ///< cells of the block of any kind
     std::vector<Field> fields;      ///< point: a tuple for every point; cell: one for every source cell
     std::vector<ArrayInfo> arrays;  ///< all arrays there are, asked for or not
+
+    std::int64_t cellCount() const { return tets.empty() ? cells.cellCount() : std::int64_t(tets.size()); }
 };
 
 /// A mesh before splitting.

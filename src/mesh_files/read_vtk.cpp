@@ -23,11 +23,13 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <optional>
 #include <set>
 #include <string_view>
 
 #include "files/name_list.h"
 #include "mesh_files/legacy_check.h"
+#include "mesh_files/read_vtu.h"
 #include "mesh_files/vtk_convert.h"
 #include "mesh_files/vtk_messages.h"
 #include "mesh_files/vtk_source.h"
@@ -217,6 +219,8 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     DeclaredSize info;
     if (format == VtkFormat::xml) info = checkXmlFile(path, allowedFolder(path, options));
     if (format == VtkFormat::legacy) checkLegacyFile(path);
+    if (format == VtkFormat::xml && info.type == "UnstructuredGrid")
+        if (std::optional<RawMesh> plain = readPlainVtu(path, options, execution)) return std::move(*plain);
     const VtkMessages messages;
     VtkSource opened = format == VtkFormat::xml      ? openXml(path, info)
                        : format == VtkFormat::legacy ? openLegacy(path)
