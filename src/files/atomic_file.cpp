@@ -23,7 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kBufferBytes = std::size_t(1) << 20;
+constexpr std::size_t kBufferBytes = std::size_t(2) << 20;
+constexpr std::size_t kDiskBlockBytes = 4096;
+constexpr std::int64_t kCachedBytes = std::int64_t(64) << 20;  // at a file's start; all of most files
 
 // Names that a signal handler may have to unlink: fixed storage, because a handler must not allocate or lock.
 struct Slot {
@@ -141,6 +143,7 @@ AtomicFile::AtomicFile(const std::string& path) : path_(path) {
 }
 
 AtomicFile::~AtomicFile() {
+    if (pastCache_ >= 0) ::close(pastCache_);
     if (descriptor_ >= 0) {
         ::close(descriptor_);
         if (!isStandardOutput_) ::unlink(temporaryPath_.c_str());
@@ -148,8 +151,24 @@ AtomicFile::~AtomicFile() {
     unregisterTemporary(slot_);
 }
 
+// False where that can't be done, by this file system say; some bytes may be written then.
+bool AtomicFile::writePastCache(std::int64_t offset, const char* bytes, std::size_t count) {
+    const auto isWhole = [](std::uint64_t n) { return n % kDiskBlockBytes == 0; };
+    if (isStandardOutput_ || offset < kCachedBytes || count < kBufferBytes ||
+        !isWhole(std::uint64_t(offset)) || !isWhole(count) ||
+        !isWhole(reinterpret_cast<std::uintptr_t>(bytes)))
+        return false;
+    if (pastCache_ == kUnopened)
+        pastCache_ = ::open(temporaryPath_.c_str(), O_WRONLY | O_DIRECT | O_NOFOLLOW | O_CLOEXEC);
+    return pastCache_ >= 0 && ::pwrite(pastCache_, bytes, count, off_t(offset)) == ssize_t(count);
+}
+
 void AtomicFile::writeAt(std::int64_t offset, const void* bytes, std::size_t count) {
     const char* next = static_cast<const char*>(bytes);
+    if (writePastCache(offset, next, count)) {
+        size_ = std::max(size_, offset + std::int64_t(count));
+        return;
+    }
     while (count > 0) {
         const ssize_t written = ::pwrite(descriptor_, next, count, off_t(offset));
         if (written < 0) {
@@ -225,11 +244,16 @@ void AtomicFile::commit(const Execution& execution) {
     slot_ = -1;
 }
 
+struct alignas(kDiskBlockBytes) AtomicFileBuffer::Piece {
+    std::array<char, kBufferBytes> bytes;
+};
+
+AtomicFileBuffer::~AtomicFileBuffer() = default;
+
 AtomicFileBuffer::AtomicFileBuffer(AtomicFile& file, const Execution& execution, Watch watch)
     : file_(&file), execution_(&execution), watch_(std::move(watch)) {
-    for (std::unique_ptr<char[]>& piece : pieces_)
-        piece = std::make_unique_for_overwrite<char[]>(kBufferBytes);
-    setp(pieces_[0].get(), pieces_[0].get() + kBufferBytes);
+    for (std::unique_ptr<Piece>& piece : pieces_) piece = std::make_unique_for_overwrite<Piece>();
+    setp(pieces_[0]->bytes.data(), pieces_[0]->bytes.data() + kBufferBytes);
 }
 
 void AtomicFileBuffer::handOver() {
@@ -244,7 +268,7 @@ void AtomicFileBuffer::handOver() {
     });
     bufferStart_ += std::int64_t(piece.size());
     std::swap(pieces_[0], pieces_[1]);
-    setp(pieces_[0].get(), pieces_[0].get() + kBufferBytes);
+    setp(pieces_[0]->bytes.data(), pieces_[0]->bytes.data() + kBufferBytes);
 }
 
 void AtomicFileBuffer::flushAll() {

@@ -27,7 +27,9 @@ class OutputClosed : public IoError {
 
 /// A file that appears at its name only when it is whole. Bytes go to a temporary file in the same directory,
 /// which `commit` syncs and renames; without a commit the destructor removes it and whatever stood at the
-/// name stays as it was.
+/// name stays as it was. What lies far behind in a large file goes past the system's cache of files, where it
+/// would take the memory of what is read more than once, and the time to get it: `commit` waits for the disk
+/// in any case.
 ///
 /// For kStandardOutput the bytes are gathered in a temporary file without a name, as most formats need to go
 /// back in it, and `commit` copies them out.
@@ -55,12 +57,15 @@ class AtomicFile {
 
   private:
     void openNameless();
+    bool writePastCache(std::int64_t offset, const char* bytes, std::size_t count);
     void copyOut(const Execution& execution) const;
 
+    static constexpr int kUnopened = -2;
     std::string path_;  // for people to read where it is standard output
     std::string temporaryPath_;
     bool isStandardOutput_ = false;
     int descriptor_ = -1;
+    int pastCache_ = kUnopened;
     int slot_ = -1;
     std::int64_t size_ = 0;
 };
@@ -74,6 +79,7 @@ class AtomicFileBuffer : public std::streambuf {
     using Watch = std::function<void(std::span<const char>)>;
     /// @param watch gets the bytes piece by piece, in the order in which they are written.
     AtomicFileBuffer(AtomicFile& file, const Execution& execution, Watch watch = {});
+    ~AtomicFileBuffer() override;
     /// Waits until all is written.
     void flushAll();
 
@@ -90,7 +96,8 @@ class AtomicFileBuffer : public std::streambuf {
     AtomicFile* file_;
     const Execution* execution_;
     Watch watch_;
-    std::array<std::unique_ptr<char[]>, 2> pieces_;  // one is filled while the other is written
+    struct Piece;
+    std::array<std::unique_ptr<Piece>, 2> pieces_;  // one is filled while the other is written
     std::future<void> writing_;
     std::int64_t bufferStart_ = 0;  // offset in the file of the buffer's first byte
 };

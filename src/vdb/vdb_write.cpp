@@ -4,9 +4,12 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
+#include <future>
 #include <limits>
 #include <map>
 #include <ostream>
+#include <set>
 #include <span>
 #include <sstream>
 #include <streambuf>
@@ -386,23 +389,14 @@ void addLevel(LevelGrids& grids, LeafForm form, const BrickTree& tree, BrickStor
     }
 }
 
-std::vector<LevelGrids> buildGrids(const std::vector<GridPlan>& plans, const std::vector<bool>& toHalf,
-                                   LeafForm form, BrickResult& result, const VdbWriteOptions& options,
-                                   double unitScale, const Execution& execution) {
-    const bool hasSurface = !result.store.surface().empty();
-    std::vector<bool> present(std::size_t(result.tree.levelCount()), false);
-    for (const BrickKey& key : result.tree.leaves()) present[std::size_t(key.level)] = true;
-    for (const auto& [key, tile] : result.store.extension()) present.at(std::size_t(key.level)) = true;
-    for (const auto& [key, tile] : result.store.surface()) present.at(std::size_t(key.level)) = true;
-    std::vector<LevelGrids> all;
-    for (int level = 0; level < result.tree.levelCount(); ++level) {
-        if (!present[std::size_t(level)]) continue;
-        const double voxel = hasSurface ? result.tree.spacingWorld(level) * unitScale : 0;
-        LevelGrids& grids = all.emplace_back(makeBuilders(plans, toHalf, form, level, options, voxel));
-        addLevel(grids, form, result.tree, result.store, execution);
-    }
-    if (all.empty()) all.push_back(makeBuilders(plans, toHalf, form, 0, options, 0));
-    return all;
+// The levels that have grids, ascending: one at least.
+std::vector<int> levelsOf(BrickResult& result) {
+    std::set<int> levels;
+    for (const BrickKey& key : result.tree.leaves()) levels.insert(key.level);
+    for (const auto& [key, tile] : result.store.extension()) levels.insert(key.level);
+    for (const auto& [key, tile] : result.store.surface()) levels.insert(key.level);
+    if (levels.empty()) levels.insert(0);
+    return {levels.begin(), levels.end()};
 }
 
 // The largest magnitude of a plan's values, in the mesh and beside it. As in the grid, a vector that isn't
@@ -452,30 +446,23 @@ void describeGrid(openvdb::GridBase& grid, const std::string& name, const BrickT
     grid.insertMeta("tessera_unit_scale", openvdb::StringMetadata(exactText(unitScale)));
 }
 
-// Grids in the order of the file: field by field, each with its finest level first, the coverage, the
-// surface. `flatLevel` is what the level is called of the bricks that a flat grid was made of.
-openvdb::GridPtrVec finishGrids(const std::vector<LevelGrids>& levels, const std::vector<GridPlan>& plans,
-                                const BrickTree& tree, const VdbWriteOptions& options, double unitScale,
-                                int flatLevel) {
-    openvdb::GridPtrVec ordered;
-    for (std::size_t p = 0; p < levels.front().builders.size(); ++p) {
+// Gives the grids of one level all that a file says of them. `flatLevel` is what the level is called of the
+// bricks that a flat grid was made of.
+void describeLevel(const LevelGrids& grids, const std::vector<GridPlan>& plans, const BrickTree& tree,
+                   const VdbWriteOptions& options, double unitScale, int flatLevel) {
+    for (std::size_t p = 0; p < grids.builders.size(); ++p) {
         const bool isField = p < plans.size();
-        for (const LevelGrids& grids : levels) {
-            openvdb::GridBase& grid = *grids.builders[p]->grid();
-            const std::string base = isField ? plans[p].name : p == plans.size() ? "coverage" : "surface";
-            describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
-                         options);
-            grid.insertMeta("tessera_level", openvdb::Int32Metadata(grids.level + flatLevel));
-            grid.insertMeta("tessera_field", openvdb::StringMetadata(isField ? plans[p].field : ""));
-            if (isField)
-                grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME
-                                                           : openvdb::GRID_UNKNOWN);
-            if (isField && plans[p].components == 3) grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
-            grids.builders[p]->describe();
-            ordered.push_back(grids.builders[p]->grid());
-        }
+        openvdb::GridBase& grid = *grids.builders[p]->grid();
+        const std::string base = isField ? plans[p].name : p == plans.size() ? "coverage" : "surface";
+        describeGrid(grid, gridName(base, options.layout, grids.level), tree, grids.level, unitScale,
+                     options);
+        grid.insertMeta("tessera_level", openvdb::Int32Metadata(grids.level + flatLevel));
+        grid.insertMeta("tessera_field", openvdb::StringMetadata(isField ? plans[p].field : ""));
+        if (isField)
+            grid.setGridClass(plans[p].components == 1 ? openvdb::GRID_FOG_VOLUME : openvdb::GRID_UNKNOWN);
+        if (isField && plans[p].components == 3) grid.setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+        grids.builders[p]->describe();
     }
-    return ordered;
 }
 
 // Counts what is written to it.
@@ -504,16 +491,24 @@ class CountingBuffer : public std::streambuf {
 class StreamArchive : public openvdb::io::Archive {
   public:
     StreamArchive() { setCompression(kVdbCompression); }
-    void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& metadata,
-                 const Execution& execution) const {
-        std::vector<GridSizes> sizes(grids.size());
-        parallelFor(execution, std::int64_t(grids.size()),
-                    [&](std::int64_t g) { sizes[std::size_t(g)] = measure(*grids[std::size_t(g)]); });
+    void writeHead(std::ostream& stream, const openvdb::MetaMap& metadata, std::size_t gridCount) const {
         stream << headWithoutUuid();
         metadata.writeMeta(stream);
-        const auto count = openvdb::Int32(grids.size());
+        const auto count = openvdb::Int32(gridCount);
         stream.write(reinterpret_cast<const char*>(&count), sizeof count);
-        for (std::size_t g = 0; g < grids.size(); ++g) writeGrid(stream, *grids[g], sizes[g]);
+    }
+    void writeGrid(std::ostream& stream, const openvdb::GridBase& grid) const {
+        const GridSizes sizes = measure(grid);
+        openvdb::io::GridDescriptor place(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+        place.writeHeader(stream);
+        const std::int64_t begin = std::int64_t(stream.tellp()) + 3 * std::int64_t(sizeof(std::int64_t));
+        place.setGridPos(begin);
+        place.setBlockPos(begin + sizes.topology);
+        place.setEndPos(begin + sizes.topology + sizes.buffers);
+        place.writeStreamPos(stream);
+        writeTopology(stream, grid);
+        grid.writeBuffers(stream);
+        TESSERA_CHECK(std::int64_t(stream.tellp()) == place.getEndPos(), "a grid is as long as was counted");
     }
 
   private:
@@ -545,42 +540,58 @@ class StreamArchive : public openvdb::io::Archive {
         grid.writeBuffers(stream);
         return {topology, counter.count() - topology};
     }
-
-    void writeGrid(std::ostream& stream, const openvdb::GridBase& grid, const GridSizes& sizes) const {
-        openvdb::io::GridDescriptor place(grid.getName(), grid.type(), grid.saveFloatAsHalf());
-        place.writeHeader(stream);
-        const std::int64_t begin = std::int64_t(stream.tellp()) + 3 * std::int64_t(sizeof(std::int64_t));
-        place.setGridPos(begin);
-        place.setBlockPos(begin + sizes.topology);
-        place.setEndPos(begin + sizes.topology + sizes.buffers);
-        place.writeStreamPos(stream);
-        writeTopology(stream, grid);
-        grid.writeBuffers(stream);
-        TESSERA_CHECK(std::int64_t(stream.tellp()) == place.getEndPos(), "a grid is as long as was counted");
-    }
 };
 
-void writeFile(AtomicFile& file, const openvdb::GridPtrVec& grids,
-               const std::map<std::string, std::string>& entries, const Execution& execution) {
-    openvdb::MetaMap metadata;
-    for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
-    metadata.insertMeta("creator", openvdb::StringMetadata("Tessera " + entries.at("tessera_version")));
+// A file that is written grid by grid, while the next ones are made.
+class GridStream {
+  public:
+    GridStream(AtomicFile& file, const std::map<std::string, std::string>& entries, std::size_t gridCount,
+               const Execution& execution)
+        : file_(file),
+          policy_(execution.threadCount() > 1 ? std::launch::async : std::launch::deferred),
+          buffer_(file, execution,
+                  [this](std::span<const char> bytes) { digest_.update(bytes.data(), bytes.size()); }),
+          stream_(&buffer_) {
+        stream_.exceptions(std::ios_base::badbit | std::ios_base::failbit);
+        openvdb::MetaMap metadata;
+        for (const auto& [key, value] : entries) metadata.insertMeta(key, openvdb::StringMetadata(value));
+        metadata.insertMeta("creator", openvdb::StringMetadata("Tessera " + entries.at("tessera_version")));
+        archive_.writeHead(stream_, metadata, gridCount);
+    }
+
+    // Returns at once; the grid stays as it is until `finish`.
+    void write(const openvdb::GridBase::Ptr& grid) {
+        await();
+        writing_ = std::async(policy_, [this, grid] { archive_.writeGrid(stream_, *grid); });
+    }
+
     // The file's UUID is the digest of all other bytes: equal content gives equal files, and a reader can
     // tell whether a file is damaged before it trusts it.
-    FileDigest digest;
-    AtomicFileBuffer buffer(file, execution,
-                            [&](std::span<const char> bytes) { digest.update(bytes.data(), bytes.size()); });
-    std::ostream stream(&buffer);
-    stream.exceptions(std::ios_base::badbit | std::ios_base::failbit);
-    try {
-        StreamArchive().writeTo(stream, grids, metadata, execution);
-        stream.flush();
-    } catch (const openvdb::Exception& error) {
-        throw IoError("can't write " + file.path() + ": " + error.what());
+    void finish() {
+        await();
+        stream_.flush();
+        const std::string uuid = digest_.uuid();
+        file_.writeAt(kUuidOffset, uuid.data(), uuid.size());
     }
-    const std::string uuid = digest.uuid();
-    file.writeAt(kUuidOffset, uuid.data(), uuid.size());
-}
+
+  private:
+    void await() {
+        if (!writing_.valid()) return;
+        try {
+            writing_.get();
+        } catch (const openvdb::Exception& error) {
+            throw IoError("can't write " + file_.path() + ": " + error.what());
+        }
+    }
+
+    AtomicFile& file_;
+    std::launch policy_;
+    FileDigest digest_;
+    AtomicFileBuffer buffer_;
+    std::ostream stream_;
+    StreamArchive archive_;
+    std::future<void> writing_;
+};
 
 /// How far the file's transform puts the furthest sample from its place, in finest voxels. OpenVDB takes the
 /// spacing of a transform that isn't turned as a difference of places, which far from the origin is rounded.
@@ -634,10 +645,19 @@ std::optional<BrickStatistics> statisticsOf(const std::vector<OutputField>& fiel
     return statistics;
 }
 
-// The grids of a file, in its order. Packed ones lie in the store's tiles; plain ones free them.
-openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm form, BrickResult& result,
-                              const VdbWriteOptions& options, VdbWriteResult& written,
-                              const Execution& execution) {
+// How the grids of a file are made of samples.
+struct GridsPlan {
+    std::vector<GridPlan> plans;
+    std::vector<bool> toHalf;
+    std::vector<int> levels;
+    bool hasSurface = false;
+
+    std::size_t gridCount() const { return levels.size() * (plans.size() + 1 + hasSurface); }
+};
+
+// Checks what is to be written and chooses its unit.
+GridsPlan planFile(const std::vector<OutputField>& fields, BrickResult& result,
+                   const VdbWriteOptions& options, VdbWriteResult& written) {
     checkOutputFields(fields, !result.store.surface().empty());
     TESSERA_CHECK((options.layout == VdbLayout::flat) == result.bricks.has_value(),
                   "a flat grid is made by flatten");
@@ -647,10 +667,29 @@ openvdb::GridPtrVec makeGrids(const std::vector<OutputField>& fields, LeafForm f
     for (const GridPlan& plan : plans)
         TESSERA_CHECK(plan.firstChannel + plan.components <= result.store.channels(),
                       "a field's channels are in the store");
-    const std::vector<bool> toHalf = choosePrecision(fields, result.store, options, written);
-    const std::vector<LevelGrids> levels =
-        buildGrids(plans, toHalf, form, result, options, written.unitScale, execution);
-    return finishGrids(levels, plans, result.tree, options, written.unitScale, result.flatLevel);
+    return {plans, choosePrecision(fields, result.store, options, written), levelsOf(result),
+            !result.store.surface().empty()};
+}
+
+// The grids in the order of the file: field by field, each with its finest level first, the coverage, the
+// surface. Packed ones lie in the store's tiles; plain ones free them. `takeFirst` gets those of the first
+// kind as soon as they are made.
+openvdb::GridPtrVec makeGrids(const GridsPlan& plan, LeafForm form, BrickResult& result,
+                              const VdbWriteOptions& options, double unitScale, const Execution& execution,
+                              const std::function<void(const openvdb::GridBase::Ptr&)>& takeFirst) {
+    std::vector<LevelGrids> levels;
+    for (const int level : plan.levels) {
+        const double voxel = plan.hasSurface ? result.tree.spacingWorld(level) * unitScale : 0;
+        LevelGrids& grids =
+            levels.emplace_back(makeBuilders(plan.plans, plan.toHalf, form, level, options, voxel));
+        addLevel(grids, form, result.tree, result.store, execution);
+        describeLevel(grids, plan.plans, result.tree, options, unitScale, result.flatLevel);
+        takeFirst(grids.builders.front()->grid());
+    }
+    openvdb::GridPtrVec ordered;
+    for (std::size_t p = 0; p < levels.front().builders.size(); ++p)
+        for (const LevelGrids& grids : levels) ordered.push_back(grids.builders[p]->grid());
+    return ordered;
 }
 
 void freeTiles(BrickStore& store, const Execution& execution) {
@@ -696,14 +735,18 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
     AtomicFile file(path);
     // Making the grids destroys the samples.
     std::optional<BrickStatistics> statistics = statisticsOf(fields, result, options, execution);
+    const GridsPlan plan = planFile(fields, result, options, written);
+    VdbMetadata metadata = describeFile(fields, result, options, written.unitScale);
+    metadata.statistics = std::move(statistics);
+    GridStream stream(file, encodeMetadata(metadata), plan.gridCount(), execution);
     const openvdb::GridPtrVec grids =
-        makeGrids(fields, LeafForm::packed, result, options, written, execution);
+        makeGrids(plan, LeafForm::packed, result, options, written.unitScale, execution,
+                  [&](const openvdb::GridBase::Ptr& grid) { stream.write(grid); });
+    for (std::size_t g = plan.levels.size(); g < grids.size(); ++g) stream.write(grids[g]);
+    stream.finish();
     for (const openvdb::GridBase::Ptr& grid : grids)
         written.activeVoxels +=
             std::int64_t(grid->metaValue<openvdb::Int64>(openvdb::GridBase::META_FILE_VOXEL_COUNT));
-    VdbMetadata metadata = describeFile(fields, result, options, written.unitScale);
-    metadata.statistics = std::move(statistics);
-    writeFile(file, grids, encodeMetadata(metadata), execution);
     written.fileBytes = file.size();
     file.commit(execution);
     freeTiles(result.store, execution);
@@ -713,7 +756,9 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
 openvdb::GridPtrVec buildVdbGrids(const std::vector<OutputField>& fields, BrickResult& result,
                                   const VdbWriteOptions& options, VdbWriteResult& written,
                                   const Execution& execution) {
-    return makeGrids(fields, LeafForm::plain, result, options, written, execution);
+    const GridsPlan plan = planFile(fields, result, options, written);
+    return makeGrids(plan, LeafForm::plain, result, options, written.unitScale, execution,
+                     [](const openvdb::GridBase::Ptr&) {});
 }
 
 }  // namespace tessera
