@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "base/check.h"
 #include "base/parallel.h"
 #include "mesh/geometry.h"
 
@@ -13,12 +14,24 @@ namespace {
 
 constexpr std::int64_t kNodeChunk = 16384;
 constexpr std::int64_t kPrefetch = 24;  // elements ahead: nodes are reached in no order
+constexpr std::int64_t kNotPlain = 1;
+// From a cell's first corner to those that begin its rows along z, in points of a tile.
+constexpr std::array<int, 4> kRows{0, kTileSize* kTileSize, kTileSize, (kTileSize + 1) * kTileSize};
+
+std::int64_t addressOf(const float* values) {
+    return reinterpret_cast<std::int64_t>(values);
+}
+const float* valuesAt(std::int64_t address) {
+    return reinterpret_cast<const float*>(address);
+}
 
 }  // namespace
 
 // @param edge of the table of tiles.
 std::array<BatchSampler::CornerSteps, 8> BatchSampler::makeCornerSteps(int edge) {
-    const std::array<int, 3> tileStep{edge * edge, edge, 1}, pointStep{64, 8, 1};
+    constexpr std::int64_t kPoint = sizeof(float);
+    const std::array<std::int64_t, 3> tileStep{std::int64_t(edge) * edge, edge, 1},
+        pointStep{64 * kPoint, 8 * kPoint, kPoint};
     std::array<CornerSteps, 8> all{};
     for (std::size_t beyond = 0; beyond < 8; ++beyond)
         for (std::size_t c = 0; c < 8; ++c)
@@ -37,6 +50,7 @@ BatchSampler::BatchSampler(const SampledMesh& samples, const BrickTree& tree, co
       mesh_(samples.mesh()),
       tree_(tree),
       tiles_(tree, store, execution),
+      stride_(std::size_t(tiles_.edge()) * std::size_t(tiles_.edge()) * std::size_t(tiles_.edge())),
       walk_(tree.walk()),
       cornerSteps_(makeCornerSteps(tiles_.edge())),
       zeros_(std::size_t(samples.channels()) * kTilePoints) {
@@ -46,6 +60,7 @@ BatchSampler::BatchSampler(const SampledMesh& samples, const BrickTree& tree, co
         nearChannel_ = field.firstChannel;
         break;
     }
+    findPlainTiles();
     resizeLarge(nodes_, mesh_.points.size());
     parallelForChunks(execution, mesh_.nodeCount(), kNodeChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t n = begin; n < end; ++n) {
@@ -134,68 +149,75 @@ void BatchSampler::findLeaves(const Box3d& bounds, SampleBatch& batch) const {
     }
 }
 
-// Whether all corners of a cell are stored and covered; then sets their addresses.
-bool BatchSampler::areCovered(const TileView* tiles, int offset, int beyond,
-                              std::array<const float*, 8>& corner) const {
-    const CornerSteps& steps = cornerSteps_[std::size_t(beyond)];
-    bool isFull = true;
+void BatchSampler::findPlainTiles() {
+    const int edge = tiles_.edge();
+    TESSERA_CHECK(tree_.leafCount() * stride_ < std::size_t(1) << 31, "tiles are counted in 32 bits");
+    plainTiles_.resize(tree_.leafCount() * stride_, kNotPlain);
+    for (std::size_t leaf = 0; leaf < tree_.leafCount(); ++leaf)
+        for (int t = 0; t < int(stride_); ++t) {
+            const TileView& view = tiles_.tiles(leaf)[t];
+            // Tiles of cells before the first one that reads stored samples only.
+            const bool isFirst = t / (edge * edge) == 0 || t / edge % edge == 0 || t % edge == 0;
+            if (view.values && !view.coverage && !(isFirst && tiles_.leaf(leaf).firstCell > 0))
+                plainTiles_[leaf * stride_ + std::size_t(t)] = addressOf(view.values);
+        }
+}
+
+// Whether all corners of a lane's cell are stored and covered; then sets their addresses.
+bool BatchSampler::findScattered(std::size_t lane, SampleBatch& batch) const {
+    const CornerSteps& steps = cornerSteps_[std::size_t(batch.beyond[lane])];
+    const std::size_t leaf = std::size_t(batch.leaf[lane]);
+    const std::size_t tile = leaf * stride_ + std::size_t(batch.tile[lane]);
+    const std::int64_t offset = batch.offset[lane];
+    std::array<std::int64_t, 8>& corner = batch.corners[lane];
+    const std::int64_t* const plain = plainTiles_.data() + tile;
+    std::int64_t tags = 0;
     for (std::size_t c = 0; c < 8; ++c) {
-        const TileView& view = tiles[steps.tile[c]];
-        if (!view.values) return false;
-        isFull &= view.coverage == nullptr;
-        corner[c] = view.values + (offset + steps.point[c]);
+        const std::int64_t values = plain[steps.tile[c]];
+        tags |= values;
+        corner[c] = values + (offset * std::int64_t(sizeof(float)) + steps.point[c]);
     }
-    if (isFull) return true;
-    for (std::size_t c = 0; c < 8; ++c)
-        if (!tiles[steps.tile[c]].covered(offset + steps.point[c])) return false;
+    if (!(tags & kNotPlain)) return true;
+    if (batch.leastCell[lane] < tiles_.leaf(leaf).firstCell) return false;
+    const TileView* const views = tiles_.tiles(leaf) + batch.tile[lane];
+    for (std::size_t c = 0; c < 8; ++c) {
+        const TileView& view = views[steps.tile[c]];
+        const std::int64_t point = offset + steps.point[c] / std::int64_t(sizeof(float));
+        if (!view.values || !view.covered(int(point))) return false;
+        corner[c] = addressOf(view.values + point);
+    }
     return true;
 }
 
 // The corners' addresses are found for all samples before the first value is read, so that the reads from
 // memory overlap.
 void BatchSampler::findCorners(SampleBatch& batch) const {
-    batch.kept = 0;
-    batch.corner.fill(zeros_.data());
-    std::array<std::uint8_t, kMeasureLanes> several;
-    std::size_t severalCount = 0;
-    for (LaneBits left = batch.inLeaves; left; left &= left - 1) {
-        const std::size_t i = std::size_t(std::countr_zero(left));
-        const std::size_t leaf = std::size_t(batch.leaf[i]);
-        if (batch.leastCell[i] < tiles_.leaf(leaf).firstCell) continue;
-        // Whether a cell reaches several tiles can't be foretold.
-        several[severalCount] = std::uint8_t(i);
-        severalCount += batch.beyond[i] != 0;
-        const TileView& view = tiles_.tiles(leaf)[batch.tile[i]];
-        bool isKept = view.values != nullptr && batch.beyond[i] == 0;
-        if (view.coverage && isKept) isKept = areCovered(&view, batch.offset[i], 0, batch.corners[i]);
-        batch.corner[i] = isKept ? view.values + batch.offset[i] : zeros_.data();
-        batch.kept |= LaneBits(isKept) << i;
-        __builtin_prefetch(batch.corner[i]);
-        __builtin_prefetch(batch.corner[i] + 8);
-        __builtin_prefetch(batch.corner[i] + 64);
-        __builtin_prefetch(batch.corner[i] + 72);
-    }
+    batch.kept = measure::findCorners(batch, batch.inLeaves, plainTiles_.data(), int(stride_));
     batch.scatteredCount = 0;
-    for (std::size_t n = 0; n < severalCount; ++n) {
-        const std::size_t i = several[n];
-        if (!areCovered(tiles_.tiles(std::size_t(batch.leaf[i])) + batch.tile[i], batch.offset[i],
-                        batch.beyond[i], batch.corners[i]))
-            continue;
+    for (LaneBits left = batch.lanes() & ~batch.kept; left; left &= left - 1) {
+        const std::size_t i = std::size_t(std::countr_zero(left));
+        batch.corner[i] = addressOf(zeros_.data());
+        if (!(batch.inLeaves >> i & 1) || !findScattered(i, batch)) continue;
         batch.kept |= LaneBits(1) << i;
         batch.scattered[batch.scatteredCount++] = std::uint8_t(i);
-        for (std::size_t c = 0; c < 8; ++c) __builtin_prefetch(batch.corners[i][c]);
+        for (const std::int64_t corner : batch.corners[i]) __builtin_prefetch(valuesAt(corner));
+    }
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        const float* const corner = valuesAt(batch.corner[i]);
+        for (const int point : kRows) __builtin_prefetch(corner + point);
     }
 }
 
 void BatchSampler::readCorners(int channel, SampleBatch& batch) const {
     const std::size_t from = std::size_t(channel) * kTilePoints;
-    for (std::size_t i = 0; i < std::size_t(batch.count); ++i)
+    for (std::size_t i = 0; i < std::size_t(batch.count); ++i) {
+        const float* const corner = valuesAt(batch.corner[i]) + from;
         for (std::size_t row = 0; row < 4; ++row)
-            std::memcpy(&batch.values.row[row][2 * i], batch.corner[i] + from + cornerSteps_[0].point[row],
-                        2 * sizeof(float));
+            std::memcpy(&batch.values.row[row][2 * i], corner + kRows[row], 2 * sizeof(float));
+    }
     for (std::size_t n = 0; n < batch.scatteredCount; ++n)
         for (std::size_t c = 0; c < 8; ++c)
-            batch.values.at(c, batch.scattered[n]) = batch.corners[batch.scattered[n]][c][from];
+            batch.values.at(c, batch.scattered[n]) = valuesAt(batch.corners[batch.scattered[n]][c])[from];
 }
 
 void BatchSampler::measure(SampleBatch& batch) const {

@@ -23,9 +23,8 @@ struct SampleBatch : MeasureBatch {
     std::vector<LaneDoubles> exact;   ///< one a channel
     std::vector<LaneDoubles> errors;  ///< one a field: |reconstructed - exact| where kept
 
-    /// First corners, and all corners of the lanes whose cells reach several tiles.
-    std::array<const float*, kMeasureLanes> corner;
-    std::array<std::array<const float*, 8>, kMeasureLanes> corners;
+    /// All corners' addresses in the lanes whose cells reach several tiles, or one that isn't full.
+    std::array<std::array<std::int64_t, 8>, kMeasureLanes> corners;
     std::array<std::uint8_t, kMeasureLanes> scattered;
     std::size_t scatteredCount = 0;
     LaneCorners values;  ///< of one channel
@@ -55,13 +54,14 @@ class BatchSampler {
   private:
     void gatherChannels(std::int64_t first, SampleBatch& batch) const;
     LaneDoubles& nearChannel(SampleBatch& batch) const;
+    void findPlainTiles();
     void findCorners(SampleBatch& batch) const;
-    bool areCovered(const TileView* tiles, int offset, int beyond, std::array<const float*, 8>& corner) const;
+    bool findScattered(std::size_t lane, SampleBatch& batch) const;
     void readCorners(int channel, SampleBatch& batch) const;
 
     // From a cell's first corner to its corners: tiles of the table, and points in the tile.
     struct CornerSteps {
-        std::array<int, 8> tile, point;
+        std::array<std::int64_t, 8> tile, point;  // points in bytes
     };
     static std::array<CornerSteps, 8> makeCornerSteps(int edge);
 
@@ -69,7 +69,9 @@ class BatchSampler {
     const TetMesh& mesh_;
     const BrickTree& tree_;
     LeafTiles tiles_;
+    std::size_t stride_;  // tiles of a leaf
     BrickTree::Walk walk_;
+    std::vector<std::int64_t> plainTiles_;    // see measure::findCorners
     std::array<CornerSteps, 8> cornerSteps_;  // by MeasureBatch::beyond
     std::vector<float> zeros_;          // what is read where there are no corners: a tile of every channel
     const Field* nearField_ = nullptr;  // the first one at nodes, whose first component is at hand:

@@ -189,6 +189,24 @@ void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
     });
 }
 
+LaneBits findCorners(MeasureBatch& batch, LaneBits lanes, const std::int64_t* tiles, int tilesPerLeaf) {
+    const Ints ints;
+    const hn::Rebind<std::int64_t, D> words;
+    LaneBits found = 0;
+    forVectors(batch, [&](std::size_t i) {
+        const auto ofLeaf = hn::Mul(hn::Load(ints, batch.leaf.lane + i), hn::Set(ints, tilesPerLeaf));
+        const auto at =
+            hn::IfThenElseZero(maskOf(ints, lanes, i), hn::Add(ofLeaf, hn::Load(ints, batch.tile.lane + i)));
+        const auto tile = hn::GatherIndex(words, tiles, hn::PromoteTo(words, at));
+        const auto offset = hn::PromoteTo(words, hn::Load(ints, batch.offset.lane + i));
+        hn::Store(hn::Add(tile, hn::ShiftLeft<2>(offset)), words, batch.corner.lane + i);
+        const auto isSingle = hn::Eq(hn::Load(ints, batch.beyond.lane + i), hn::Zero(ints));
+        const auto isPlain = hn::Eq(hn::And(tile, hn::Set(words, 1)), hn::Zero(words));
+        found |= bitsOf(ints, isSingle, i) & bitsOf(words, isPlain, i);
+    });
+    return found & lanes;
+}
+
 void addDifference(const MeasureBatch& batch, const LaneCorners& corners, const LaneDoubles& exact,
                    bool isSquared, LaneDoubles& sum) {
     const V one = set(1);
@@ -282,6 +300,7 @@ HWY_EXPORT(placeNodes);
 HWY_EXPORT(placeElements);
 HWY_EXPORT(findLeaves);
 HWY_EXPORT(locateCells);
+HWY_EXPORT(findCorners);
 HWY_EXPORT(addDifference);
 HWY_EXPORT(finishErrors);
 HWY_EXPORT(listErrors);
@@ -305,6 +324,9 @@ LaneBits findLeaves(MeasureBatch& batch, const BrickTree::Walk& walk, double inv
 }
 void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge) {
     HWY_DYNAMIC_DISPATCH(locateCells)(batch, brickCells, tilesPerEdge);
+}
+LaneBits findCorners(MeasureBatch& batch, LaneBits lanes, const std::int64_t* tiles, int tilesPerLeaf) {
+    return HWY_DYNAMIC_DISPATCH(findCorners)(batch, lanes, tiles, tilesPerLeaf);
 }
 void addDifference(const MeasureBatch& batch, const LaneCorners& corners, const LaneDoubles& exact,
                    bool isSquared, LaneDoubles& sum) {

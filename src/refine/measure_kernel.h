@@ -66,7 +66,8 @@ struct alignas(64) MeasureBatch {
     /// Of the cell: the tile and the offset there of the first corner, 1, 2 and 4 where the corners beyond it
     /// along x, y and z lie in other tiles, and its least index on any axis.
     LaneInts tile, offset, beyond, leastCell;
-    LaneBits kept;  ///< whose error is measured here
+    Lanes<std::int64_t> corner;  ///< address of the first corner's value
+    LaneBits kept;               ///< whose error is measured here
     int count;
 
     LaneBits lanes() const { return ~LaneBits(0) >> (kMeasureLanes - count); }
@@ -95,6 +96,10 @@ LaneBits findLeaves(MeasureBatch& batch, const BrickTree::Walk& walk, double inv
                     const Box3d& bounds);
 /// Cells and fractions in the leaves' frames, as locateInBrick. @param tilesPerEdge of the table of tiles.
 void locateCells(MeasureBatch& batch, int brickCells, int tilesPerEdge);
+/// Addresses of the first corners of cells of `lanes` that lie in one tile whose points can all be read
+/// without a look at its coverage; returns those lanes. @param tiles of all leaves, `tilesPerLeaf` each: the
+/// address of the tile's values, odd for other tiles.
+LaneBits findCorners(MeasureBatch& batch, LaneBits lanes, const std::int64_t* tiles, int tilesPerLeaf);
 /// Adds what a component contributes to the error of its field: |interpolated - exact|, of fields with
 /// several components its square.
 void addDifference(const MeasureBatch& batch, const LaneCorners& corners, const LaneDoubles& exact,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -11,34 +12,28 @@
 
 namespace tessera {
 
-/// Some nodes of a mesh, a bit each: small enough to stay in the nearest cache while elements ask for their
-/// nodes in no order.
+/// Some nodes of a mesh, a byte each: it is told in one instruction whether a node is there, and one is
+/// inserted without a lock.
 class NodeSet {
   public:
     NodeSet() = default;
-    explicit NodeSet(std::size_t nodes) : words_((nodes + 63) / 64, 0) {}
+    explicit NodeSet(std::size_t nodes) : isIn_(nodes, 0) {}
 
-    bool contains(std::size_t node) const { return words_[node / 64] >> node % 64 & 1; }
-    /// Whether it has the first so many.
-    bool containsAll(std::size_t nodes) const {
-        for (std::size_t node = 0; node < nodes; ++node)
-            if (!contains(node)) return false;
-        return true;
-    }
+    bool contains(std::size_t node) const { return isIn_[node] != 0; }
+    bool containsAll() const { return std::find(isIn_.begin(), isIn_.end(), std::uint8_t(0)) == isIn_.end(); }
     /// Several threads may insert at once.
     void insert(const std::array<std::int32_t, 4>& tet) {
-        for (const std::int32_t node : tet) {
-            // Reading first keeps the cache line shared once the bit is set.
-            const std::uint64_t bit = std::uint64_t(1) << node % 64;
-            std::atomic_ref<std::uint64_t> word(words_[std::size_t(node) / 64]);
-            if (!(word.load(std::memory_order_relaxed) & bit)) word.fetch_or(bit, std::memory_order_relaxed);
-        }
+        const auto at = [&](std::int32_t node) { return std::atomic_ref(isIn_[std::size_t(node)]); };
+        const auto has = [&](std::int32_t node) { return at(node).load(std::memory_order_relaxed); };
+        // Reading first keeps the cache lines shared once the nodes are there.
+        if (has(tet[0]) & has(tet[1]) & has(tet[2]) & has(tet[3])) return;
+        for (const std::int32_t node : tet) at(node).store(1, std::memory_order_relaxed);
     }
 
     friend bool operator==(const NodeSet&, const NodeSet&) = default;
 
   private:
-    std::vector<std::uint64_t> words_;
+    std::vector<std::uint8_t> isIn_;
 };
 
 /// Those that some element uses, flat or not.

@@ -290,7 +290,7 @@ SampleErrors Measurement::run() {
     SampleErrors result;
     result.sums = newPart().sums;
     addSums(elements, result);
-    if (!known && !used.containsAll(samples_.nodeCount())) {
+    if (!known && !used.containsAll()) {
         for (auto& list : lists_) std::fill(list.begin(), list.begin() + mesh_.nodeCount(), -1.0f);
         nodes = measureNodes(&used);
     }

@@ -184,6 +184,32 @@ TEST_P(MeasureKernel, LocatesCells) {
     });
 }
 
+TEST_P(MeasureKernel, FindsCorners) {
+    constexpr int kLeaves = 5, kTiles = 8;
+    std::vector<std::int64_t> tiles(kLeaves * kTiles);
+    for (std::size_t t = 0; t < tiles.size(); ++t)
+        tiles[t] = 0x7f0012345000 + 2048 * std::int64_t(t) + (t % 3 == 0);
+    LaneBits lanes = 0;
+    for (std::size_t i = 0; i < kMeasureLanes; ++i) {
+        lanes |= LaneBits(i < count() && i % 4 != 1) << i;
+        batch_->leaf[i] = i % 4 == 1 ? -1 : std::int32_t(any(0, kLeaves));
+        batch_->tile[i] = std::int32_t(any(0, kTiles));
+        batch_->offset[i] = std::int32_t(any(0, kTilePoints));
+        batch_->beyond[i] = std::max(0, int(any(-8, 8)));
+    }
+    onEveryTarget([&] {
+        const LaneBits found = measure::findCorners(*batch_, lanes, tiles.data(), kTiles);
+        for (std::size_t i = 0; i < kMeasureLanes; ++i) {
+            const bool isAsked = lanes >> i & 1;
+            const std::int64_t tile =
+                isAsked ? tiles[std::size_t(batch_->leaf[i] * kTiles + batch_->tile[i])] : 1;
+            const bool isFound = tile % 2 == 0 && batch_->beyond[i] == 0;
+            EXPECT_EQ(found >> i & 1, isFound);
+            EXPECT_EQ(isFound ? batch_->corner[i] : 0, isFound ? tile + 4 * batch_->offset[i] : 0);
+        }
+    });
+}
+
 TEST_P(MeasureKernel, TakesErrors) {
     LaneCorners corners;
     LaneDoubles exact;
