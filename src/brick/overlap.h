@@ -14,6 +14,7 @@ inline constexpr double kBrickSlackVoxels = 1.0 / 128;
 class ElementOverlap {
   public:
     explicit ElementOverlap(const std::array<Vec3d, 4>& nodes);
+    const std::array<Vec3d, 4>& nodes() const { return nodes_; }
     const Box3d& bounds() const { return bounds_; }
     /// The element's bounding box meets the box (min inclusive, max exclusive).
     bool boundsTouch(const Box3d& box) const {

@@ -8,6 +8,7 @@
 
 #include "base/parallel.h"
 #include "refine/brick_touch.h"
+#include "refine/touch_kernel.h"
 #include "tessera/lattice.h"
 
 namespace tessera {
@@ -92,12 +93,30 @@ std::vector<PlannedBrick> BrickPlan::children(const PlannedBrick& brick) const {
     const BrickChildren children(brick.key, frame_);
     for (unsigned c = 0; c < 8; ++c) made[c].key = children.key(c);
     const std::size_t count = brick.elements.size();
+    std::vector<ChildBits> touched(count);
+    TouchBatch pairs;
+    std::array<std::pair<std::size_t, ChildBits>, kTouchLanes> pairOf;  // element, and bit of the child
+    const auto settlePairs = [&] {
+        const std::uint64_t touching = tessera::touching(pairs);
+        for (std::size_t i = 0; i < pairs.count; ++i)
+            if (!(touching >> i & 1)) touched[pairOf[i].first] ^= pairOf[i].second;
+        pairs.count = 0;
+    };
     for (std::size_t n = 0; n < count; ++n) {
-        const std::int32_t e = brick.elements[n];
         prefetchNodes(*mesh_, brick.elements[std::min(n + std::size_t(kPrefetchElements), count - 1)]);
-        unsigned bits = children.touchedBy(overlapOf(*mesh_, frame_, e, brick.key.depth + 1));
-        for (; bits != 0; bits &= bits - 1) made[std::size_t(std::countr_zero(bits))].elements.push_back(e);
+        const ElementOverlap own = overlapOf(*mesh_, frame_, brick.elements[n], brick.key.depth + 1);
+        unsigned bits = touched[n] = children.meetingBounds(own);
+        if (std::has_single_bit(bits)) continue;
+        for (; bits != 0; bits &= bits - 1) {
+            pairOf[pairs.count] = {n, ChildBits(bits & -bits)};
+            pairs.add(own.nodes(), children.touchBox(unsigned(std::countr_zero(bits))));
+            if (pairs.count == kTouchLanes) settlePairs();
+        }
     }
+    settlePairs();
+    for (std::size_t n = 0; n < count; ++n)
+        for (unsigned bits = touched[n]; bits != 0; bits &= bits - 1)
+            made[std::size_t(std::countr_zero(bits))].elements.push_back(brick.elements[n]);
     splitSamples(brick, made);
     return made;
 }
@@ -146,23 +165,25 @@ void BrickPlan::splitSamples(const PlannedBrick& brick, std::vector<PlannedBrick
 
 bool BrickPlan::split(std::span<const DepthKey> keys, std::size_t maxLeaves, const Execution& execution) {
     const TreeChange& change = tree_.change();
-    std::vector<PlannedBrick> made;  // in the order of change.added
+    std::vector<std::uint32_t> split;  // slots of the bricks that are, in the order of change.added
     const auto choose = [&](std::span<const GrowingLeaf> wave, std::span<ChildBits> bits) {
-        std::vector<std::vector<PlannedBrick>> all(wave.size());
         parallelFor(execution, std::int64_t(wave.size()), [&](std::int64_t i) {
-            all[std::size_t(i)] = children(bricks_[wave[std::size_t(i)].slot]);
+            PlannedBrick& brick = bricks_[wave[std::size_t(i)].slot];
+            if (brick.children.empty()) brick.children = children(brick);
+            for (unsigned c = 0; c < 8; ++c)
+                if (!brick.children[c].elements.empty())
+                    bits[std::size_t(i)] = ChildBits(bits[std::size_t(i)] | 1u << c);
         });
-        for (std::size_t i = 0; i < wave.size(); ++i)
-            for (unsigned c = 0; c < 8; ++c) {
-                if (all[i][c].elements.empty()) continue;
-                bits[i] = ChildBits(bits[i] | 1u << c);
-                made.push_back(std::move(all[i][c]));
-            }
+        for (const GrowingLeaf& leaf : wave) split.push_back(leaf.slot);
     };
     if (!tree_.split(keys, maxLeaves, choose)) return false;
-    for (const GrowingLeaf& leaf : change.removed) bricks_[leaf.slot] = {};
     bricks_.resize(tree_.slotCount());
-    for (std::size_t i = 0; i < made.size(); ++i) bricks_[change.added[i].slot] = std::move(made[i]);
+    auto added = change.added.begin();
+    for (const std::uint32_t slot : split) {
+        for (PlannedBrick& child : bricks_[slot].children)
+            if (!child.elements.empty()) bricks_[(added++)->slot] = std::move(child);
+        bricks_[slot] = {};
+    }
     return true;
 }
 

@@ -37,6 +37,9 @@ struct PlannedBrick {
     bool sampled = false;                ///< error-driven: its values are in the store
     std::int64_t storeLeaf = -1;         ///< error-driven: where
     double ratio = 0;                    ///< error-driven: what refinement goes by
+    /// All eight, those without elements too, where a split that didn't fit has found them: the next try,
+    /// with fewer bricks, needs them again. Else none.
+    std::vector<PlannedBrick> children;
 };
 
 /// Bricks min to max, both included.

@@ -72,7 +72,7 @@ BrickChildren::BrickChildren(const DepthKey& parent, const PlanFrame& frame)
         if (insideBounds(key(c), frame)) allowed_ = ChildBits(allowed_ | 1u << c);
 }
 
-ChildBits BrickChildren::touchedBy(const ElementOverlap& element, unsigned asked) const {
+ChildBits BrickChildren::meetingBounds(const ElementOverlap& element) const {
     // Per axis the lower and the upper children share their bounds.
     const Box3d& own = element.bounds();
     std::array<bool, 6> touched;
@@ -85,6 +85,11 @@ ChildBits BrickChildren::touchedBy(const ElementOverlap& element, unsigned asked
     for (std::size_t c = 0; c < 8; ++c)
         if ((allowed_ >> c & 1) && touched[c & 1] && touched[2 + ((c >> 1) & 1)] && touched[4 + (c >> 2)])
             bits |= 1u << c;
+    return ChildBits(bits);
+}
+
+ChildBits BrickChildren::touchedBy(const ElementOverlap& element, unsigned asked) const {
+    unsigned bits = meetingBounds(element);
     if (std::has_single_bit(bits)) return ChildBits(bits & asked);
     bits &= asked;
     for (unsigned c = 0; c < 8; ++c)

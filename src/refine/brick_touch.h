@@ -42,6 +42,9 @@ class BrickChildren {
     DepthKey key(unsigned child) const { return childKey(parent_, child); }
     /// Those inside the frame's bounds.
     ChildBits allowed() const { return allowed_; }
+    /// Those that an element's bounds meet; where it is one the element touches it.
+    ChildBits meetingBounds(const ElementOverlap& element) const;
+    Box3d touchBox(unsigned child) const { return boxes_.box(child); }
     /// Of the children that are asked for.
     /// @param element one that touches the parent, in index space of the children's depth.
     ChildBits touchedBy(const ElementOverlap& element, unsigned asked = 0xff) const;

@@ -2,7 +2,6 @@
 #include "refine/measure_kernel.h"
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <bit>
 #include <functional>
@@ -14,6 +13,7 @@
 #include "brick/seams.h"
 #include "mesh/geometry.h"
 #include "refine/error_samples.h"
+#include "refine/every_target.h"
 #include "refine/sample_errors.h"
 
 namespace tessera {
@@ -24,19 +24,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN(),
 
 std::uint64_t bitsOf(double value) {
     return std::bit_cast<std::uint64_t>(value);
-}
-
-/// Calls check() for each instruction set.
-template <class Check>
-void onEveryTarget(const Check& check) {
-    for (const auto target : hwy::SupportedAndGeneratedTargets()) {
-        SCOPED_TRACE(hwy::TargetName(target));
-        hwy::SetSupportedTargetsForTest(target);
-        hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-        check();
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 class MeasureKernel : public testing::TestWithParam<int> {
