@@ -155,9 +155,17 @@ void ErrorRefinement::sampleNewLeaves() {
     Timer timer;
     const Depth finest = options_.frame ? plan_.frame().maxDepth : plan_.deepest();
     tree_ = plan_.tree(finest);
-    leaves_.assign(tree_.leafCount(), nullptr);
-    for (PlannedBrick* brick : plan_.leaves())
-        leaves_[std::size_t(tree_.findLeaf({levelOf(brick->key.depth, finest), brick->key.index}))] = brick;
+    // The plan has them ascending by depth, the tree by level: the finest first, in the same order within
+    // one.
+    leaves_.clear();
+    leaves_.reserve(tree_.leafCount());
+    const std::vector<PlannedBrick*> planned = plan_.leaves();
+    for (auto end = planned.end(); end != planned.begin();) {
+        auto begin = end;
+        while (begin != planned.begin() && begin[-1]->key.depth == end[-1]->key.depth) --begin;
+        leaves_.insert(leaves_.end(), begin, end);
+        end = begin;
+    }
     BrickStore next(tree_.brickCells(), tree_.leafCount(), samples_.channels());
     std::vector<std::size_t> missing;
     fresh_.assign(leaves_.size(), 0);
