@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "base/parallel.h"
+#include "refine/measure_kernel.h"
 #include "refine/sample_errors.h"
 
 namespace tessera {
@@ -76,10 +77,9 @@ struct StoredSums {
 };
 
 double tileSum(const float* values) {
-    double part[8] = {};
-    for (int i = 0; i < kTilePoints; i += 8)
-        for (int j = 0; j < 8; ++j) part[j] += double(values[i + j]);
-    return ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
+    LaneSums sums;
+    measure::addValues(values, kTilePoints, sums);
+    return sums.sum();
 }
 
 // Points whose components are all finite, when some are not.

@@ -289,6 +289,19 @@ void addIntegral(const MeasureBatch& batch, const LaneDoubles& values, LaneSums&
     });
 }
 
+void addValues(const float* values, std::size_t count, LaneSums& sums) {
+    constexpr std::size_t kVectors = kSumLanes / hn::MaxLanes(D());
+    V sum[kVectors];
+    for (std::size_t n = 0; n < kVectors; ++n)
+        sum[n] = hn::Load(D(), sums.lane.data() + n * hn::MaxLanes(D()));
+    for (std::size_t i = 0; i < count; i += kSumLanes)
+        for (std::size_t n = 0; n < kVectors; ++n)
+            sum[n] =
+                hn::Add(sum[n], hn::PromoteTo(D(), hn::LoadU(Floats(), values + i + n * hn::MaxLanes(D()))));
+    for (std::size_t n = 0; n < kVectors; ++n)
+        hn::Store(sum[n], D(), sums.lane.data() + n * hn::MaxLanes(D()));
+}
+
 }  // namespace tessera::measure::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -307,6 +320,7 @@ HWY_EXPORT(listErrors);
 HWY_EXPORT(addSquares);
 HWY_EXPORT(addNodeSquares);
 HWY_EXPORT(addIntegral);
+HWY_EXPORT(addValues);
 
 void gatherNodes(MeasureBatch& batch, const Quad* nodes) {
     HWY_DYNAMIC_DISPATCH(gatherNodes)(batch, nodes);
@@ -346,6 +360,9 @@ void addNodeSquares(const MeasureBatch& batch, const float* listed, double share
 }
 void addIntegral(const MeasureBatch& batch, const LaneDoubles& values, LaneSums& sums) {
     HWY_DYNAMIC_DISPATCH(addIntegral)(batch, values, sums);
+}
+void addValues(const float* values, std::size_t count, LaneSums& sums) {
+    HWY_DYNAMIC_DISPATCH(addValues)(values, count, sums);
 }
 
 }  // namespace tessera::measure

@@ -116,6 +116,8 @@ void addSquares(const MeasureBatch& batch, const LaneFloats& listed, double shar
 void addNodeSquares(const MeasureBatch& batch, const float* listed, double share, SquareSums& sums);
 /// Adds volume times value, where that is finite.
 void addIntegral(const MeasureBatch& batch, const LaneDoubles& values, LaneSums& sums);
+/// Adds stored values, value i to the sum of i modulo 8. @param count a multiple of 8.
+void addValues(const float* values, std::size_t count, LaneSums& sums);
 
 }  // namespace measure
 

@@ -290,6 +290,20 @@ TEST_P(MeasureKernel, AddsNodesUp) {
     });
 }
 
+TEST(MeasureKernelValues, AddUpInEightSums) {
+    std::mt19937_64 random(5);
+    std::vector<float> values(512);
+    for (float& value : values) value = std::uniform_real_distribution(-1e3f, 1e3f)(random);
+    LaneSums expected;
+    for (std::size_t i = 0; i < values.size(); ++i) expected.lane[i % kSumLanes] += double(values[i]);
+    onEveryTarget([&] {
+        LaneSums sums;
+        measure::addValues(values.data(), values.size(), sums);
+        for (std::size_t lane = 0; lane < kSumLanes; ++lane)
+            EXPECT_EQ(bitsOf(sums.lane[lane]), bitsOf(expected.lane[lane]));
+    });
+}
+
 INSTANTIATE_TEST_SUITE_P(Counts, MeasureKernel, testing::Values(1, 3, 8, 13, 63, 64),
                          testing::PrintToStringParamName());
 
