@@ -248,8 +248,8 @@ class PlainVtu {
                 isSound &= node < points;
                 tet[k] = std::int32_t(node);
             }
-            isSound &= (tet[0] != tet[1]) & (tet[0] != tet[2]) & (tet[0] != tet[3]) & (tet[1] != tet[2]) &
-                       (tet[1] != tet[3]) & (tet[2] != tet[3]);
+            for (std::size_t k = 1; k < 4; ++k)
+                for (std::size_t j = 0; j < k; ++j) isSound &= tet[j] != tet[k];
         }
         return isSound;
     }

@@ -73,10 +73,11 @@ class Parser {
         while (true) {
             const std::size_t before = rest_.size();
             skipSpaces();
+            const bool isApart = rest_.size() < before;
             isEmpty = take("/>");
             if (isEmpty || take(">")) return true;
             const std::string name = word();
-            if (before == rest_.size() || name.empty() || !take("=")) return false;
+            if (!isApart || name.empty() || !take("=")) return false;
             const char quote = rest_.empty() ? '\0' : rest_.front();
             if (quote != '"' && quote != '\'') return false;
             const std::size_t end = rest_.find(quote, 1);
