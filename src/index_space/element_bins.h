@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-/// For every region the elements whose bounding boxes hold one of its lattice points, ascending.
+/// For every region the elements near its lattice points, ascending.
 struct ElementBins {
     std::vector<std::int64_t> first;  ///< regions + 1 offsets into `elements`
     UninitializedVector<std::int32_t> elements;
@@ -22,10 +22,16 @@ struct ElementBins {
     }
 };
 
+/// Which elements are near a region.
+struct NearTest {
+    float marginVoxels = 0;  ///< bounding boxes are widened by this, besides their slight widening
+    /// Also leaves out most of those that lie between the lattice points of their boxes.
+    bool dropsBetween = false;
+};
+
 /// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice
 /// point in their (slightly widened) bounding box appear nowhere.
-/// @param marginVoxels boxes are widened by this, besides.
 ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<const IndexBox> regions,
-                        const Execution& execution, float marginVoxels = 0);
+                        const Execution& execution, const NearTest& test = {});
 
 }  // namespace tessera

@@ -241,7 +241,7 @@ void BoundRaster::Run::binRegions() {
     for (;;) {
         std::vector<IndexBox> regionBoxes;
         for (const RasterRegion& region : regions_) regionBoxes.push_back(region.points);
-        bins_ = binElements(mesh(), frame_, regionBoxes, execution_, float(kLargestMargin));
+        bins_ = binElements(mesh(), frame_, regionBoxes, execution_, {.marginVoxels = float(kLargestMargin)});
         std::vector<RasterRegion> cut;
         for (std::size_t r = 0; r < regions_.size(); ++r)
             cutRegion(std::move(regions_[r]),

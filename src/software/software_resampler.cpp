@@ -149,7 +149,7 @@ class BoundSoftware : public BoundResampler {
         // The elements near a single region are its own.
         const ElementBins bins = part && regions.size() == 1
                                      ? everyElement(mesh)
-                                     : binElements(mesh, frame, regionBoxes, execution);
+                                     : binElements(mesh, frame, regionBoxes, execution, {.dropsBetween = true});
         statistics.add(counted::elementsNear, mesh.elementCount());
         statistics.add(counted::elementBlockPairs, std::int64_t(bins.elements.size()));
         statistics.addMs(stage::bin, timer.restart());
