@@ -11,6 +11,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -62,16 +63,19 @@ inline constexpr double kEasy = 2;
 
 /// Setup of eight elements, lane by lane.
 struct alignas(64) Batch {
-    double whole[4][3][kBatch], part[4][3][kBatch];  // node places
     double planeA[4][kBatch], planeB[4][kBatch], planeC[4][kBatch];
     double lower[kBatch];               // sum of 2^i over the faces i that bound s from below
     double base[3][kBatch];             // first voxel, x y z
     double axis[kBatch];                // scan axis
     double minS[kBatch], maxS[kBatch];  // widened bounds
-    double minT[kBatch], maxT[kBatch], minR[kBatch], maxR[kBatch];  // whole numbers
-    double grade[kBatch];                                           // kThin, kDoubtful or kEasy
+    double grade[kBatch];               // kThin, kDoubtful or kEasy
     double shrink[4][kBatch];  // added to planeA: the face moved inwards by as much as it was moved outwards
     double gradient[4][3][kBatch], constant[4][kBatch];  // barycentrics: constant + gradient . (s, t, r)
+    // The part of the element's box that lies in the region, relative to the element's first voxel:
+    double from[3][kBatch], lastS[kBatch];              // its first voxel, s t r, and its last one along s
+    double origin[kBatch], stride[3][kBatch];           // offset of that first voxel in the block; of s, t, r
+    double rowsT[kBatch], inverseT[kBatch];             // rows along t, and one over that
+    std::int32_t countT[kBatch], countR[kBatch];        // rows; 0 where no voxel lies in the part
 };
 
 /// A channel of eight elements: value = constant + s, t, r times the gradient, limited to [low, high].
@@ -79,13 +83,13 @@ struct alignas(64) BatchChannel {
     double node[4][kBatch];
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
-    bool finite[kBatch];
-    bool inDouble[kBatch];  // a run's values don't come out right in float: denormal steps, too many of them,
-                            // or steps that overflow
-    float step[kBatch];     // difference from voxel to voxel along the scan axis
-    // Of the rows at work:
-    alignas(64) double first[kMostRows];  // value at the first voxel of the run
-    alignas(64) double alongT[kBatch];    // what t adds to the constant
+    float step[kBatch];               // difference from voxel to voxel along the scan axis
+    unsigned finiteBits, floatBits;   // elements whose values are finite, and whose runs come out right in
+                                      // float, too: no denormal steps, nor too many, nor overflowing ones
+    alignas(64) double first[kMostRows];  // value at the first voxel of the run, of the rows at work
+
+    bool isFinite(int lane) const { return finiteBits >> lane & 1; }
+    bool isInFloat(int lane) const { return floatBits >> lane & 1; }
 };
 
 /// Rows of the elements at work: where each one's run starts in the block, how long it is there, and how many
@@ -164,19 +168,66 @@ HWY_INLINE V cross1(V a, V b, V c, V d) {
     return hn::Sub(hn::Mul(a, b), hn::Mul(c, d));
 }
 
-// Planes, bounds and gradients of the lanes from `lane` on.
-void setUpLanes(Batch& batch, std::size_t lane) {
+// What is scanned, into what.
+struct Walk {
+    const ScanInput& input;
+    const ScanOutput& output;
+    Scratch& scratch;
+    ScanCounts& counts;
+    double regionMin[3], regionLast[3], blockMin[3], stride[3];  // of the output, x y z
+    std::optional<ElementDepth> depth;
+    std::int32_t depthOf = kNoOwner;
+};
+
+// Two neighbouring numbers of each of as many nodes as there are lanes.
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE void loadPairs(const double* const* at, std::size_t offset, V& first, V& second) {
+    first = hn::Set(D(), at[0][offset]);
+    second = hn::Set(D(), at[0][offset + 1]);
+}
+#else
+template <class Numbers>
+HWY_INLINE hn::VFromD<Numbers> everySecondPair(Numbers numbers, const double* const* at, std::size_t offset) {
+    constexpr std::size_t kLanes = hn::MaxLanes(Numbers());
+    if constexpr (kLanes == 2) {
+        return hn::LoadU(numbers, *at + offset);
+    } else {
+        const hn::Half<Numbers> half;
+        return hn::Combine(numbers, everySecondPair(half, at + kLanes / 2, offset),
+                           everySecondPair(half, at, offset));
+    }
+}
+HWY_INLINE void loadPairs(const double* const* at, std::size_t offset, V& first, V& second) {
+    const V even = everySecondPair(D(), at, offset), odd = everySecondPair(D(), at + 1, offset);
+    first = hn::InterleaveLower(D(), even, odd);
+    second = hn::InterleaveUpper(D(), even, odd);
+}
+#endif
+
+HWY_INLINE V least4(const V (&v)[4][3], int axis) {
+    return hn::Min(hn::Min(v[0][axis], v[1][axis]), hn::Min(v[2][axis], v[3][axis]));
+}
+HWY_INLINE V most4(const V (&v)[4][3], int axis) {
+    return hn::Max(hn::Max(v[0][axis], v[1][axis]), hn::Max(v[2][axis], v[3][axis]));
+}
+
+// Planes, bounds and gradients of the lanes from `lane` on, and their parts in the region.
+void setUpLanes(const Walk& walk, const double* const (&nodes)[4][kBatch], std::size_t lane) {
     const D d;
-    V v[4][3], low[3], high[3];
+    Batch& batch = walk.scratch.batch;
+    V v[4][3], part[4][3], base[3], low[3], high[3];
+    static_assert(offsetof(NodeFrame::Node, part) == 3 * sizeof(double));
+    for (int k = 0; k < 4; ++k) {
+        loadPairs(&nodes[k][lane], 0, v[k][0], v[k][1]);
+        loadPairs(&nodes[k][lane], 2, v[k][2], part[k][0]);
+        loadPairs(&nodes[k][lane], 4, part[k][1], part[k][2]);
+    }
     for (int a = 0; a < 3; ++a) {
-        V whole[4];
-        for (int k = 0; k < 4; ++k) whole[k] = hn::Load(d, &batch.whole[k][a][lane]);
-        const V base = hn::Min(hn::Min(whole[0], whole[1]), hn::Min(whole[2], whole[3]));
-        hn::Store(base, d, &batch.base[a][lane]);
-        for (int k = 0; k < 4; ++k)
-            v[k][a] = hn::Add(hn::Sub(whole[k], base), hn::Load(d, &batch.part[k][a][lane]));
-        low[a] = hn::Min(hn::Min(v[0][a], v[1][a]), hn::Min(v[2][a], v[3][a]));
-        high[a] = hn::Max(hn::Max(v[0][a], v[1][a]), hn::Max(v[2][a], v[3][a]));
+        base[a] = least4(v, a);
+        hn::Store(base[a], d, &batch.base[a][lane]);
+        for (int k = 0; k < 4; ++k) v[k][a] = hn::Add(hn::Sub(v[k][a], base[a]), part[k][a]);
+        low[a] = least4(v, a);
+        high[a] = most4(v, a);
     }
 
     // The scan axis, and the element turned so that s is along it: x: (x, y, z), y: (y, x, z), z: (z, x, y).
@@ -188,24 +239,53 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     const auto alongX = hn::Not(hn::Or(alongY, alongZ));
     hn::Store(hn::IfThenElse(alongZ, hn::Set(d, 2.0), hn::IfThenElseZero(alongY, hn::Set(d, 1.0))), d,
               &batch.axis[lane]);
-    const auto turn = [&](V& a, V& b, V& c) {
-        const V s = hn::IfThenElse(alongZ, c, hn::IfThenElse(alongY, b, a));
-        const V t = hn::IfThenElse(alongX, b, a);
-        const V r = hn::IfThenElse(alongZ, b, c);
-        a = s;
-        b = t;
-        c = r;
+    const auto turn = [&](V (&of)[3]) {
+        const V s = hn::IfThenElse(alongZ, of[2], hn::IfThenElse(alongY, of[1], of[0]));
+        const V t = hn::IfThenElse(alongX, of[1], of[0]);
+        of[2] = hn::IfThenElse(alongZ, of[1], of[2]);
+        of[0] = s;
+        of[1] = t;
     };
-    for (int k = 0; k < 4; ++k) turn(v[k][0], v[k][1], v[k][2]);
-    turn(low[0], low[1], low[2]);
-    turn(high[0], high[1], high[2]);
-    const V slack = hn::Set(d, kBoxSlack);
-    hn::Store(hn::Sub(low[0], slack), d, &batch.minS[lane]);
-    hn::Store(hn::Add(high[0], slack), d, &batch.maxS[lane]);
-    hn::Store(hn::Ceil(hn::Sub(low[1], slack)), d, &batch.minT[lane]);
-    hn::Store(hn::Floor(hn::Add(high[1], slack)), d, &batch.maxT[lane]);
-    hn::Store(hn::Ceil(hn::Sub(low[2], slack)), d, &batch.minR[lane]);
-    hn::Store(hn::Floor(hn::Add(high[2], slack)), d, &batch.maxR[lane]);
+    V from[3], to[3], stride[3];
+    for (int a = 0; a < 3; ++a) {
+        from[a] = hn::Sub(hn::Set(d, walk.regionMin[a]), base[a]);
+        to[a] = hn::Sub(hn::Set(d, walk.regionLast[a]), base[a]);
+        base[a] = hn::Sub(base[a], hn::Set(d, walk.blockMin[a]));
+        stride[a] = hn::Set(d, walk.stride[a]);
+    }
+    if (!hn::AllTrue(d, alongX)) {
+        for (V (&node)[3] : v) turn(node);
+        for (V (*of)[3] : {&low, &high, &from, &to, &base, &stride}) turn(*of);
+    }
+    const V slack = hn::Set(d, kBoxSlack), one = hn::Set(d, 1.0);
+    auto isSome = hn::Eq(one, one);
+    for (int i = 0; i < 3; ++i) {
+        const V least = hn::Sub(low[i], slack), most = hn::Add(high[i], slack);
+        if (i == 0) {
+            hn::Store(least, d, &batch.minS[lane]);
+            hn::Store(most, d, &batch.maxS[lane]);
+        }
+        const V first = hn::Max(from[i], hn::Ceil(least)), last = hn::Min(to[i], hn::Floor(most));
+        isSome = hn::And(isSome, hn::Le(first, last));
+        if (i > 0) {
+            from[i] = first;
+            to[i] = last;
+        }
+        hn::Store(from[i], d, &batch.from[i][lane]);
+        hn::Store(stride[i], d, &batch.stride[i][lane]);
+    }
+    hn::Store(to[0], d, &batch.lastS[lane]);
+    hn::Store(hn::Add(hn::Add(hn::Mul(hn::Add(from[0], base[0]), stride[0]),
+                              hn::Mul(hn::Add(from[1], base[1]), stride[1])),
+                      hn::Mul(hn::Add(from[2], base[2]), stride[2])),
+              d, &batch.origin[lane]);
+    const V rowsT = hn::IfThenElseZero(isSome, hn::Add(hn::Sub(to[1], from[1]), one)),
+            rowsR = hn::IfThenElseZero(isSome, hn::Add(hn::Sub(to[2], from[2]), one));
+    const hn::Rebind<std::int32_t, D> di;
+    hn::Store(rowsT, d, &batch.rowsT[lane]);
+    hn::Store(hn::Div(one, rowsT), d, &batch.inverseT[lane]);
+    hn::Store(hn::DemoteTo(di, rowsT), di, &batch.countT[lane]);
+    hn::Store(hn::DemoteTo(di, rowsR), di, &batch.countR[lane]);
 
     // Barycentric gradients: cross products of two edges over six times the volume.
     V e[3][3];
@@ -220,7 +300,6 @@ void setUpLanes(Batch& batch, std::size_t lane) {
         n[k][2] = cross1(p[0], q[1], p[1], q[0]);
     }
     const V det = dot3(e[0][0], e[0][1], e[0][2], n[0][0], n[0][1], n[0][2]);
-    const V one = hn::Set(d, 1.0);
     const V inverse = hn::Div(one, det);
     V g[4][3], c[4];
     for (int k = 1; k < 4; ++k) {
@@ -264,35 +343,54 @@ void setUpLanes(Batch& batch, std::size_t lane) {
     hn::Store(lower, d, &batch.lower[lane]);
 }
 
-// value = f0 + sum over i of (fi - f0) b_i.
+void loadBatch(const Walk& walk, const std::int32_t* elements, int count) {
+    const double* nodes[4][kBatch];
+    for (int lane = 0; lane < kBatch; ++lane) {
+        const auto& tet = walk.input.mesh.tets[std::size_t(elements[lane < count ? lane : 0])];
+        for (std::size_t k = 0; k < 4; ++k) nodes[k][lane] = walk.input.frame.nodes[std::size_t(tet[k])].whole;
+    }
+    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpLanes(walk, nodes, lane);
+}
+
+// value = f0 + sum over i of (fi - f0) b_i; what the values are limited to, and how runs come out right.
 void setUpChannelLanes(const Batch& batch, BatchChannel& channel, std::size_t lane) {
     const D d;
-    const V f0 = hn::Load(d, &channel.node[0][lane]);
-    V sum[4] = {f0, hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+    const hn::Rebind<float, D> df;
+    constexpr double kMost = std::numeric_limits<float>::max();
+    const V infinity = hn::Set(d, std::numeric_limits<double>::infinity());
+    V f[4], low = infinity, high = hn::Neg(infinity);
+    auto isFinite = hn::Eq(low, low);
+    for (int k = 0; k < 4; ++k) {
+        f[k] = hn::Load(d, &channel.node[k][lane]);
+        const V rounded = hn::PromoteTo(d, hn::DemoteTo(df, f[k]));
+        isFinite = hn::And(isFinite, hn::Le(hn::Abs(rounded), hn::Set(d, kMost)));
+        low = hn::IfThenElse(hn::Lt(rounded, low), rounded, low);
+        high = hn::IfThenElse(hn::Gt(rounded, high), rounded, high);
+    }
+    const V steps = hn::Sub(hn::Load(d, &batch.maxS[lane]), hn::Load(d, &batch.minS[lane]));
+    const auto isInFloat =
+        hn::And(hn::And(isFinite, hn::Ge(hn::Max(hn::Abs(low), hn::Abs(high)), hn::Set(d, kDenormalSteps))),
+                hn::And(hn::Le(steps, hn::Set(d, kMostFloatSteps)),
+                        hn::Lt(hn::Sub(high, low), hn::Set(d, kWidestFloatRange))));
+    channel.finiteBits |= bitsOf(isFinite) << lane;
+    channel.floatBits |= bitsOf(isInFloat) << lane;
+    hn::Store(hn::DemoteTo(df, low), df, &channel.low[lane]);
+    hn::Store(hn::DemoteTo(df, high), df, &channel.high[lane]);
+    for (V& value : f) value = hn::IfThenElseZero(isFinite, value);
+    V sum[4] = {f[0], hn::Zero(d), hn::Zero(d), hn::Zero(d)};
     for (int k = 1; k < 4; ++k) {
-        const V df = hn::Sub(hn::Load(d, &channel.node[k][lane]), f0);
-        sum[0] = hn::Add(sum[0], hn::Mul(df, hn::Load(d, &batch.constant[k][lane])));
+        const V difference = hn::Sub(f[k], f[0]);
+        sum[0] = hn::Add(sum[0], hn::Mul(difference, hn::Load(d, &batch.constant[k][lane])));
         for (int a = 0; a < 3; ++a)
-            sum[a + 1] = hn::Add(sum[a + 1], hn::Mul(df, hn::Load(d, &batch.gradient[k][a][lane])));
+            sum[a + 1] =
+                hn::Add(sum[a + 1], hn::Mul(difference, hn::Load(d, &batch.gradient[k][a][lane])));
     }
     hn::Store(sum[0], d, &channel.constant[lane]);
     hn::Store(sum[1], d, &channel.gradientS[lane]);
     hn::Store(sum[2], d, &channel.gradientT[lane]);
     hn::Store(sum[3], d, &channel.gradientR[lane]);
-}
-
-void loadBatch(const ScanInput& input, const std::int32_t* elements, int count, Batch& batch) {
-    for (int lane = 0; lane < kBatch; ++lane) {
-        const auto& tet = input.mesh.tets[std::size_t(elements[lane < count ? lane : 0])];
-        for (std::size_t k = 0; k < 4; ++k) {
-            const NodeFrame::Node& node = input.frame.nodes[std::size_t(tet[k])];
-            for (int a = 0; a < 3; ++a) {
-                batch.whole[k][a][lane] = node.whole[a];
-                batch.part[k][a][lane] = node.part[a];
-            }
-        }
-    }
-    for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpLanes(batch, lane);
+    const V step = hn::Min(hn::Max(sum[1], hn::Set(d, -kMost)), hn::Set(d, kMost));
+    hn::Store(hn::DemoteTo(df, step), df, &channel.step[lane]);
 }
 
 void loadChannel(const ScanInput& input, const ScanChannel& source, const std::int32_t* elements, int count,
@@ -300,41 +398,12 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
     for (int lane = 0; lane < kBatch; ++lane) {
         const std::int32_t element = elements[lane < count ? lane : 0];
         const auto& tet = input.mesh.tets[std::size_t(element)];
-        float low = std::numeric_limits<float>::infinity(), high = -low;
-        bool finite = true;
-        for (std::size_t k = 0; k < 4; ++k) {
-            const double value = source.at(source.cell ? element : tet[k]);
-            const float rounded = float(value);
-            finite = finite && std::isfinite(rounded);
-            low = rounded < low ? rounded : low;
-            high = rounded > high ? rounded : high;
-            channel.node[k][lane] = value;
-        }
-        channel.low[lane] = low;
-        channel.high[lane] = high;
-        channel.finite[lane] = finite;
-        channel.inDouble[lane] = std::max(std::fabs(low), std::fabs(high)) < kDenormalSteps ||
-                                 batch.maxS[lane] - batch.minS[lane] > kMostFloatSteps ||
-                                 double(high) - double(low) >= kWidestFloatRange;
-        if (!finite)
-            for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = 0.0;
+        for (std::size_t k = 0; k < 4; ++k)
+            channel.node[k][lane] = source.at(source.cell ? element : tet[k]);
     }
+    channel.finiteBits = channel.floatBits = 0;
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpChannelLanes(batch, channel, lane);
-    constexpr double kLimit = std::numeric_limits<float>::max();
-    for (int lane = 0; lane < kBatch; ++lane)
-        channel.step[lane] = float(std::clamp(channel.gradientS[lane], -kLimit, kLimit));
 }
-
-// What is scanned, into what.
-struct Walk {
-    const ScanInput& input;
-    const ScanOutput& output;
-    Scratch& scratch;
-    ScanCounts& counts;
-    double regionMin[3], regionLast[3], blockMin[3], stride[3];  // of the output, x y z
-    std::optional<ElementDepth> depth;
-    std::int32_t depthOf = kNoOwner;
-};
 
 HWY_INLINE float limited(float value, float low, float high) {
     value = value < low ? low : value;
@@ -342,10 +411,10 @@ HWY_INLINE float limited(float value, float low, float high) {
 }
 
 float valueAt(const BatchChannel& channel, int lane, int row, double number) {
-    if (!channel.finite[lane]) return std::numeric_limits<float>::quiet_NaN();
-    const float value = channel.inDouble[lane]
-                            ? float(channel.first[row] + number * channel.gradientS[lane])
-                            : float(channel.first[row]) + float(number) * channel.step[lane];
+    if (!channel.isFinite(lane)) return std::numeric_limits<float>::quiet_NaN();
+    const float value = channel.isInFloat(lane)
+                            ? float(channel.first[row]) + float(number) * channel.step[lane]
+                            : float(channel.first[row] + number * channel.gradientS[lane]);
     return limited(value, channel.low[lane], channel.high[lane]);
 }
 
@@ -426,7 +495,7 @@ HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
     for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
-        if (channel.finite[lane] && !channel.inDouble[lane]) {
+        if (channel.isInFloat(lane)) {
             fillRun(out, stride, length, skipped, float(channel.first[row]), channel.step[lane],
                     channel.low[lane], channel.high[lane]);
         } else {
@@ -492,19 +561,23 @@ void writeRows(Walk& walk) {
     rows.count = rows.hits = 0;
 }
 
-/// Elements with scanlines that double precision can't decide are solved by code of their own.
-constexpr int kCarefully = 5;
-
 // Where faces leave scanlines room: s from the greatest bound of the first `lower` faces to the least of the
-// others. A face's bound is what t gives and C r.
-HWY_INLINE void narrow(int lower, const V (&alongT)[4], const V (&planeC)[4], V r, V& low, V& high) {
+// others. Of an element that isn't degenerate, the first is always a lower one and the last an upper one.
+struct Room {
+    V low, high;
+};
+template <bool IsAnyOrder>
+HWY_INLINE Room narrow(Room room, const V (&bounds)[4], const M (&isLower)[4]) {
     for (int i = 0; i < 4; ++i) {
-        const V bound = hn::Add(alongT[i], hn::Mul(planeC[i], r));
-        if (i < lower)
-            low = hn::Max(low, bound);
-        else
-            high = hn::Min(high, bound);
+        const V low = hn::Max(room.low, bounds[i]), high = hn::Min(room.high, bounds[i]);
+        if (IsAnyOrder || i == 1 || i == 2) {
+            room.low = hn::IfThenElse(isLower[i], low, room.low);
+            room.high = hn::IfThenElse(isLower[i], room.high, high);
+        } else {
+            (i == 0 ? room.low : room.high) = i == 0 ? low : high;
+        }
     }
+    return room;
 }
 
 // True for scanlines between whose ends, and those when the faces are moved inwards instead of outwards, low
@@ -532,18 +605,10 @@ HWY_NOINLINE void decideEnds(const ExactScanlines& exact, unsigned doubtful, V t
     end = hn::Load(d, ends);
 }
 
-// The part of an element that lies in the region, relative to its first voxel: s, t and r.
-struct Part {
-    double from[3], to[3];
-    double origin, stride[3];  // offset of the part's first voxel in the block; of s, t and r
-    bool isWithin;             // no run is cut
-    bool isAlongX;
-};
-
-// Solves the rows of one element, a vector of them along t and then along r; `Lower` of the four faces bound
-// s from below, or kCarefully.
-template <int Lower>
-void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
+// Solves the rows of one element, as many at once as a vector holds, along t and then along r. `IsCareful`:
+// its faces may come in any order, and double precision may not decide its scanlines.
+template <bool IsCareful>
+HWY_INLINE void solveRows(Walk& walk, int lane) {
     const D d;
     const hn::Rebind<std::int32_t, D> di;
     constexpr int kLanes = int(hn::MaxLanes(d));
@@ -552,164 +617,105 @@ void solveRows(Walk& walk, int lane, const Part& part, const FaceOrder& order) {
     Rows& rows = scratch.rows;
     BatchChannel* const channels = scratch.channels.data();
     const std::size_t channelCount = walk.input.channels.size();
-    const int lower = Lower == kCarefully ? order.lower : Lower;
-    const V minS = hn::Set(d, batch.minS[lane]), maxS = hn::Set(d, batch.maxS[lane]),
-            fromS = hn::Set(d, part.from[0]), strideS = hn::Set(d, part.stride[0]),
-            strideR = hn::Set(d, part.stride[2]), one = hn::Set(d, 1.0);
-    V planeC[4];
-    for (int i = 0; i < 4; ++i) planeC[i] = hn::Set(d, batch.planeC[order.face[i]][lane]);
-    const V gradientR0 = hn::Set(d, channels[0].gradientR[lane]),
-            gradientS0 = hn::Set(d, channels[0].gradientS[lane]);
+    const auto ofLane = [&](const double (&of)[kBatch]) { return hn::Set(d, of[lane]); };
+    const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
+    M isLower[4];
+    V planeA[4], planeB[4], planeC[4];
+    for (int i = 0; i < 4; ++i) {
+        const int face = order.face[i];
+        isLower[i] = hn::Lt(hn::Set(d, double(i)), hn::Set(d, double(order.lower)));
+        planeA[i] = ofLane(batch.planeA[face]);
+        planeB[i] = ofLane(batch.planeB[face]);
+        planeC[i] = ofLane(batch.planeC[face]);
+    }
+    const Room whole{ofLane(batch.minS), ofLane(batch.maxS)};
+    const V fromS = ofLane(batch.from[0]), fromT = ofLane(batch.from[1]), fromR = ofLane(batch.from[2]),
+            lastS = ofLane(batch.lastS), origin = ofLane(batch.origin), strideS = ofLane(batch.stride[0]),
+            strideT = ofLane(batch.stride[1]), strideR = ofLane(batch.stride[2]),
+            rowsT = ofLane(batch.rowsT), inverseT = ofLane(batch.inverseT), half = hn::Set(d, 0.5),
+            one = hn::Set(d, 1.0);
     std::optional<ExactScanlines> exact;
-    const int countT = int(part.to[1] - part.from[1]) + 1, countR = int(part.to[2] - part.from[2]) + 1;
-    walk.counts.scanlines += std::int64_t(countT) * countR;
-    for (int done = 0; done < countT; done += kLanes) {
-        const unsigned used = (1u << std::min(countT - done, kLanes)) - 1;
-        const V t = hn::Iota(d, part.from[1] + done);
-        V alongT[4], inner[4];
-        for (int i = 0; i < 4; ++i) {
-            const int face = order.face[i];
-            const V plane = hn::Mul(hn::Set(d, batch.planeB[face][lane]), t);
-            alongT[i] = hn::Add(hn::Set(d, batch.planeA[face][lane]), plane);
-            if (Lower == kCarefully)
-                inner[i] = hn::Add(hn::Set(d, batch.planeA[face][lane] + batch.shrink[face][lane]), plane);
-        }
-        const auto valueAlongT = [&](const BatchChannel& channel) {
-            return hn::Add(hn::Set(d, channel.constant[lane]),
-                           hn::Mul(hn::Set(d, channel.gradientT[lane]), t));
-        };
-        const V value0 = valueAlongT(channels[0]);
-        for (std::size_t c = 1; c < channelCount; ++c)
-            hn::Store(valueAlongT(channels[c]), d, channels[c].alongT);
-        // Of the part's first voxel there. Offsets in the block are whole numbers in double, but that of the
-        // element's own first voxel might not be.
-        V rowOffset =
-            hn::Add(hn::Set(d, part.origin), hn::Mul(hn::Iota(d, double(done)), hn::Set(d, part.stride[1])));
-        V r = hn::Set(d, part.from[2]);
-        for (int left = countR; left > 0;) {
-            if (rows.count == kMostRows) writeRows(walk);
-            const int some = std::min(left, (kMostRows - rows.count) / kLanes);
-            left -= some;
-            int hits = rows.hits;
-            for (int at = rows.count; at < rows.count + some * kLanes; at += kLanes) {
-                V low = minS, high = maxS;
-                narrow(lower, alongT, planeC, r, low, high);
-                V begin = hn::Ceil(low), end = hn::Floor(high);
-                if (Lower == kCarefully) {
-                    V innerLow = minS, innerHigh = maxS;
-                    narrow(lower, inner, planeC, r, innerLow, innerHigh);
-                    const unsigned doubtful = used & bitsOf(doubtfulEnds(innerLow, innerHigh, begin, end));
-                    if (doubtful != 0) {
-                        if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
-                        decideEnds(*exact, doubtful, t, r, begin, end);
-                    }
-                }
-                const auto keep = [&](V number, std::int32_t* list) {
-                    hn::Store(hn::DemoteTo(di, number), di, list + at);
-                };
-                const auto valueOf = [&](V ofT, V gradientR, V gradientS) {
-                    return hn::Add(hn::Add(ofT, hn::Mul(gradientR, r)), hn::Mul(gradientS, begin));
-                };
-                hn::Store(valueOf(value0, gradientR0, gradientS0), d, channels[0].first + at);
-                for (std::size_t c = 1; c < channelCount; ++c)
-                    hn::Store(
-                        valueOf(hn::Load(d, channels[c].alongT), hn::Set(d, channels[c].gradientR[lane]),
-                                hn::Set(d, channels[c].gradientS[lane])),
-                        d, channels[c].first + at);
-                if (HWY_LIKELY(part.isWithin)) {
-                    hn::Store(hn::Zero(di), di, rows.skipped + at);
-                } else {
-                    const V first = hn::Max(begin, fromS);
-                    end = hn::Min(end, hn::Set(d, part.to[0]));
-                    keep(hn::Sub(first, begin), rows.skipped);
-                    begin = first;
-                }
-                const V inPart = hn::Sub(begin, fromS);
-                keep(hn::Add(rowOffset, HWY_LIKELY(part.isAlongX) ? inPart : hn::Mul(inPart, strideS)),
-                     rows.offset);
-                keep(hn::Add(hn::Sub(end, begin), one), rows.length);
-                const unsigned hit = used & bitsOf(hn::Le(begin, end));
-                for (int q = 0; q < kLanes; q += 4) {
-                    const SetBits& set = kSetBits[(hit >> q) & 15];
-                    const std::uint64_t four =
-                        set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
-                    std::memcpy(rows.hit + hits, &four, sizeof four);
-                    hits += set.count;
-                }
-                r = hn::Add(r, one);
-                rowOffset = hn::Add(rowOffset, strideR);
+    const int count = batch.countT[lane] * batch.countR[lane];
+    walk.counts.scanlines += count;
+    for (int done = 0; done < count;) {
+        if (rows.count == kMostRows) writeRows(walk);
+        const int end = std::min(count, done + kMostRows - rows.count);
+        int at = rows.count, hits = rows.hits;
+        for (; done < end; done += kLanes, at += kLanes) {
+            const V number = hn::Iota(d, double(done));
+            const V inR = hn::Floor(hn::Mul(hn::Add(number, half), inverseT));
+            const V inT = hn::Sub(number, hn::Mul(inR, rowsT));
+            const V t = hn::Add(fromT, inT), r = hn::Add(fromR, inR);
+            V bounds[4], alongR[4];
+            for (int i = 0; i < 4; ++i) {
+                alongR[i] = hn::Mul(planeC[i], r);
+                bounds[i] = hn::Add(hn::Add(planeA[i], hn::Mul(planeB[i], t)), alongR[i]);
             }
-            rows.count += some * kLanes;
-            rows.hits = hits;
+            const Room room = narrow<IsCareful>(whole, bounds, isLower);
+            V begin = hn::Ceil(room.low), last = hn::Floor(room.high);
+            const unsigned used = (1u << std::min(count - done, kLanes)) - 1;
+            if constexpr (IsCareful) {
+                for (int i = 0; i < 4; ++i) {
+                    const V inner = hn::Add(planeA[i], ofLane(batch.shrink[order.face[i]]));
+                    bounds[i] = hn::Add(hn::Add(inner, hn::Mul(planeB[i], t)), alongR[i]);
+                }
+                const Room inner = narrow<IsCareful>(whole, bounds, isLower);
+                const unsigned doubtful = used & bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
+                if (batch.grade[lane] == kDoubtful && doubtful != 0) {
+                    if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
+                    decideEnds(*exact, doubtful, t, r, begin, last);
+                }
+            }
+            for (std::size_t c = 0; c < std::max<std::size_t>(1, channelCount); ++c) {
+                const BatchChannel& channel = channels[c];
+                const V ofT = hn::Add(ofLane(channel.constant), hn::Mul(ofLane(channel.gradientT), t));
+                hn::Store(hn::Add(hn::Add(ofT, hn::Mul(ofLane(channel.gradientR), r)),
+                                  hn::Mul(ofLane(channel.gradientS), begin)),
+                          d, channels[c].first + at);
+            }
+            const auto keep = [&](V value, std::int32_t* list) {
+                hn::Store(hn::DemoteTo(di, value), di, list + at);
+            };
+            const V first = hn::Max(begin, fromS);
+            last = hn::Min(last, lastS);
+            // Offsets in the block are whole numbers in double, but that of the element's own first voxel
+            // might not be.
+            const V rowOffset = hn::Add(hn::Add(origin, hn::Mul(inT, strideT)), hn::Mul(inR, strideR));
+            keep(hn::Sub(first, begin), rows.skipped);
+            keep(hn::Add(rowOffset, hn::Mul(hn::Sub(first, fromS), strideS)), rows.offset);
+            keep(hn::Add(hn::Sub(last, first), one), rows.length);
+            const unsigned hit = used & bitsOf(hn::Le(first, last));
+            for (int q = 0; q < kLanes; q += 4) {
+                const SetBits& set = kSetBits[(hit >> q) & 15];
+                const std::uint64_t four =
+                    set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
+                std::memcpy(rows.hit + hits, &four, sizeof four);
+                hits += set.count;
+            }
         }
+        rows.count = at;
+        rows.hits = hits;
     }
 }
 
 void walkElement(Walk& walk, int lane) {
     Scratch& scratch = walk.scratch;
     const Batch& batch = scratch.batch;
-    const int axis = int(batch.axis[lane]);
-    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
-    Part part;
-    for (int i = 0; i < 3; ++i) {
-        const int a = axes[i];
-        const double base = batch.base[a][lane];
-        part.from[i] = walk.regionMin[a] - base;
-        part.to[i] = walk.regionLast[a] - base;
-        part.stride[i] = walk.stride[a];
+    if (batch.countT[lane] * batch.countR[lane] == 0) return;
+    if (batch.grade[lane] == kThin) {
+        writeRows(walk);
+        scanElementExactly(walk.input, walk.output, scratch.element[lane], walk.counts);
+        return;
     }
-    part.from[1] = std::max(part.from[1], batch.minT[lane]);
-    part.to[1] = std::min(part.to[1], batch.maxT[lane]);
-    part.from[2] = std::max(part.from[2], batch.minR[lane]);
-    part.to[2] = std::min(part.to[2], batch.maxR[lane]);
-    if (!(part.from[1] <= part.to[1] && part.from[2] <= part.to[2])) return;
-    part.origin = 0;
-    for (int i = 0; i < 3; ++i)
-        part.origin += (part.from[i] + (batch.base[axes[i]][lane] - walk.blockMin[axes[i]])) * part.stride[i];
-    part.isWithin = batch.minS[lane] >= part.from[0] && batch.maxS[lane] <= part.to[0];
-    part.isAlongX = axis == 0;
+    const int axis = int(batch.axis[lane]);
     scratch.stride[lane] = walk.output.stride[axis];
-    const BatchChannel& channel = scratch.channels[0];
-    const bool isSimple =
-        axis == 0 && walk.input.channels.size() == 1 && channel.finite[lane] && !channel.inDouble[lane];
+    const bool isSimple = axis == 0 && walk.input.channels.size() == 1 && scratch.channels[0].isInFloat(lane);
     scratch.longest[lane] = isSimple ? kShortRun : 0;
-    const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
-    switch (batch.grade[lane] == kDoubtful ? kCarefully : order.lower) {
-        case 0:
-            solveRows<0>(walk, lane, part, order);
-            break;
-        case 1:
-            solveRows<1>(walk, lane, part, order);
-            break;
-        case 2:
-            solveRows<2>(walk, lane, part, order);
-            break;
-        case 3:
-            solveRows<3>(walk, lane, part, order);
-            break;
-        case 4:
-            solveRows<4>(walk, lane, part, order);
-            break;
-        default:
-            solveRows<kCarefully>(walk, lane, part, order);
-            break;
-    }
-}
-
-// False for elements beside the region or between its voxels, and for those without a place.
-bool holdsVoxel(const Walk& walk, int lane) {
-    const Batch& batch = walk.scratch.batch;
-    const int axis = int(batch.axis[lane]);
-    const int axes[3] = {axis, axis == 0 ? 1 : 0, axis == 2 ? 1 : 2};  // of s, t and r
-    const double low[3] = {std::ceil(batch.minS[lane]), batch.minT[lane], batch.minR[lane]},
-                 high[3] = {std::floor(batch.maxS[lane]), batch.maxT[lane], batch.maxR[lane]};
-    for (int i = 0; i < 3; ++i) {
-        const double base = batch.base[axes[i]][lane];
-        const double from = std::max(low[i], walk.regionMin[axes[i]] - base),
-                     to = std::min(high[i], walk.regionLast[axes[i]] - base);
-        if (!(low[i] <= high[i] && from <= to)) return false;
-    }
-    return true;
+    const int lower = kFaceOrder[std::size_t(batch.lower[lane])].lower;
+    if (HWY_LIKELY(batch.grade[lane] == kEasy && lower > 0 && lower < 4))
+        solveRows<false>(walk, lane);
+    else
+        solveRows<true>(walk, lane);
 }
 
 // Elements reach for their nodes in no order: fetch those of the next batch while this one is worked, and the
@@ -744,18 +750,11 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         const int count = int(std::min<std::size_t>(kBatch, elements.size() - begin));
         const std::int32_t* batchElements = elements.data() + begin;
         if (isLarge) prefetch(input, elements, begin + kBatch);
-        loadBatch(input, batchElements, count, scratch.batch);
+        loadBatch(walk, batchElements, count);
         for (std::size_t c = 0; c < input.channels.size(); ++c)
             loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);
         std::copy_n(batchElements, count, scratch.element);
-        for (int lane = 0; lane < count; ++lane) {
-            if (scratch.batch.grade[lane] != kThin) {
-                walkElement(walk, lane);
-            } else if (holdsVoxel(walk, lane)) {
-                writeRows(walk);
-                scanElementExactly(input, output, batchElements[lane], counts);
-            }
-        }
+        for (int lane = 0; lane < count; ++lane) walkElement(walk, lane);
         writeRows(walk);
     }
 }
