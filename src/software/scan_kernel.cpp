@@ -605,18 +605,28 @@ HWY_NOINLINE void decideEnds(const ExactScanlines& exact, unsigned doubtful, V t
     end = hn::Load(d, ends);
 }
 
-// Solves the rows of one element, as many at once as a vector holds, along t and then along r. `IsCareful`:
-// its faces may come in any order, and double precision may not decide its scanlines.
-template <bool IsCareful>
-HWY_INLINE void solveRows(Walk& walk, int lane) {
+/// Lambdas that hold an inner loop: as one function of its own it would keep its vectors in memory.
+#define TESSERA_INLINE __attribute__((always_inline))
+
+/// How the rows of an element are put into vectors.
+enum class RowOrder {
+    packed,   ///< side by side, whatever their number along t
+    aligned,  ///< a vector along t goes through all r: less work for each, if most of its lanes have a row
+    careful,  ///< packed, with faces in any order, and double precision may not decide the scanlines
+};
+
+// Solves the rows of one element.
+template <RowOrder kOrder>
+HWY_NOINLINE void solveRows(Walk& walk, int lane) {
+    constexpr bool kIsCareful = kOrder == RowOrder::careful, kIsAligned = kOrder == RowOrder::aligned;
+    constexpr int kLanes = int(hn::MaxLanes(D()));
     const D d;
     const hn::Rebind<std::int32_t, D> di;
-    constexpr int kLanes = int(hn::MaxLanes(d));
     Scratch& scratch = walk.scratch;
     const Batch& batch = scratch.batch;
     Rows& rows = scratch.rows;
     BatchChannel* const channels = scratch.channels.data();
-    const std::size_t channelCount = walk.input.channels.size();
+    const std::size_t channelCount = std::max<std::size_t>(1, walk.input.channels.size());
     const auto ofLane = [&](const double (&of)[kBatch]) { return hn::Set(d, of[lane]); };
     const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
     M isLower[4];
@@ -631,71 +641,107 @@ HWY_INLINE void solveRows(Walk& walk, int lane) {
     const Room whole{ofLane(batch.minS), ofLane(batch.maxS)};
     const V fromS = ofLane(batch.from[0]), fromT = ofLane(batch.from[1]), fromR = ofLane(batch.from[2]),
             lastS = ofLane(batch.lastS), origin = ofLane(batch.origin), strideS = ofLane(batch.stride[0]),
-            strideT = ofLane(batch.stride[1]), strideR = ofLane(batch.stride[2]),
-            rowsT = ofLane(batch.rowsT), inverseT = ofLane(batch.inverseT), half = hn::Set(d, 0.5),
-            one = hn::Set(d, 1.0);
+            strideT = ofLane(batch.stride[1]), strideR = ofLane(batch.stride[2]), one = hn::Set(d, 1.0);
     std::optional<ExactScanlines> exact;
-    const int count = batch.countT[lane] * batch.countR[lane];
+    const int countT = batch.countT[lane], countR = batch.countR[lane], count = countT * countR;
     walk.counts.scanlines += count;
-    for (int done = 0; done < count;) {
-        if (rows.count == kMostRows) writeRows(walk);
-        const int end = std::min(count, done + kMostRows - rows.count);
-        int at = rows.count, hits = rows.hits;
-        for (; done < end; done += kLanes, at += kLanes) {
-            const V number = hn::Iota(d, double(done));
-            const V inR = hn::Floor(hn::Mul(hn::Add(number, half), inverseT));
-            const V inT = hn::Sub(number, hn::Mul(inR, rowsT));
-            const V t = hn::Add(fromT, inT), r = hn::Add(fromR, inR);
-            V bounds[4], alongR[4];
+
+    // What t decides of the rows of a vector: it is the same for all r where they are aligned.
+    struct AlongT {
+        V t, bounds[4], value, offset;
+    } along;
+    const auto goAlongT = [&](V inT) TESSERA_INLINE {
+        along.t = hn::Add(fromT, inT);
+        for (int i = 0; i < 4; ++i) along.bounds[i] = hn::Add(planeA[i], hn::Mul(planeB[i], along.t));
+        along.offset = hn::Add(origin, hn::Mul(inT, strideT));
+    };
+    const auto valueAlongT = [&](const BatchChannel& channel) {
+        return hn::Add(ofLane(channel.constant), hn::Mul(ofLane(channel.gradientT), along.t));
+    };
+    const auto solve = [&](V inR, unsigned used, int at, int& hits) TESSERA_INLINE {
+        const V r = hn::Add(fromR, inR);
+        V bounds[4];
+        for (int i = 0; i < 4; ++i) bounds[i] = hn::Add(along.bounds[i], hn::Mul(planeC[i], r));
+        const Room room = narrow<kIsCareful>(whole, bounds, isLower);
+        V begin = hn::Ceil(room.low), last = hn::Floor(room.high);
+        if constexpr (kIsCareful) {
             for (int i = 0; i < 4; ++i) {
-                alongR[i] = hn::Mul(planeC[i], r);
-                bounds[i] = hn::Add(hn::Add(planeA[i], hn::Mul(planeB[i], t)), alongR[i]);
+                const V inner = hn::Add(planeA[i], ofLane(batch.shrink[order.face[i]]));
+                bounds[i] =
+                    hn::Add(hn::Add(inner, hn::Mul(planeB[i], along.t)), hn::Mul(planeC[i], r));
             }
-            const Room room = narrow<IsCareful>(whole, bounds, isLower);
-            V begin = hn::Ceil(room.low), last = hn::Floor(room.high);
-            const unsigned used = (1u << std::min(count - done, kLanes)) - 1;
-            if constexpr (IsCareful) {
-                for (int i = 0; i < 4; ++i) {
-                    const V inner = hn::Add(planeA[i], ofLane(batch.shrink[order.face[i]]));
-                    bounds[i] = hn::Add(hn::Add(inner, hn::Mul(planeB[i], t)), alongR[i]);
-                }
-                const Room inner = narrow<IsCareful>(whole, bounds, isLower);
-                const unsigned doubtful = used & bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
-                if (batch.grade[lane] == kDoubtful && doubtful != 0) {
-                    if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
-                    decideEnds(*exact, doubtful, t, r, begin, last);
-                }
-            }
-            for (std::size_t c = 0; c < std::max<std::size_t>(1, channelCount); ++c) {
-                const BatchChannel& channel = channels[c];
-                const V ofT = hn::Add(ofLane(channel.constant), hn::Mul(ofLane(channel.gradientT), t));
-                hn::Store(hn::Add(hn::Add(ofT, hn::Mul(ofLane(channel.gradientR), r)),
-                                  hn::Mul(ofLane(channel.gradientS), begin)),
-                          d, channels[c].first + at);
-            }
-            const auto keep = [&](V value, std::int32_t* list) {
-                hn::Store(hn::DemoteTo(di, value), di, list + at);
-            };
-            const V first = hn::Max(begin, fromS);
-            last = hn::Min(last, lastS);
-            // Offsets in the block are whole numbers in double, but that of the element's own first voxel
-            // might not be.
-            const V rowOffset = hn::Add(hn::Add(origin, hn::Mul(inT, strideT)), hn::Mul(inR, strideR));
-            keep(hn::Sub(first, begin), rows.skipped);
-            keep(hn::Add(rowOffset, hn::Mul(hn::Sub(first, fromS), strideS)), rows.offset);
-            keep(hn::Add(hn::Sub(last, first), one), rows.length);
-            const unsigned hit = used & bitsOf(hn::Le(first, last));
-            for (int q = 0; q < kLanes; q += 4) {
-                const SetBits& set = kSetBits[(hit >> q) & 15];
-                const std::uint64_t four =
-                    set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
-                std::memcpy(rows.hit + hits, &four, sizeof four);
-                hits += set.count;
+            const Room inner = narrow<kIsCareful>(whole, bounds, isLower);
+            const unsigned doubtful = used & bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
+            if (batch.grade[lane] == kDoubtful && doubtful != 0) {
+                if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
+                decideEnds(*exact, doubtful, along.t, r, begin, last);
             }
         }
-        rows.count = at;
-        rows.hits = hits;
+        for (std::size_t c = 0; c < channelCount; ++c) {
+            const BatchChannel& channel = channels[c];
+            const V ofT = kIsAligned && c == 0 ? along.value : valueAlongT(channel);
+            hn::Store(hn::Add(hn::Add(ofT, hn::Mul(ofLane(channel.gradientR), r)),
+                              hn::Mul(ofLane(channel.gradientS), begin)),
+                      d, channels[c].first + at);
+        }
+        const auto keep = [&](V value, std::int32_t* list) {
+            hn::Store(hn::DemoteTo(di, value), di, list + at);
+        };
+        const V first = hn::Max(begin, fromS);
+        last = hn::Min(last, lastS);
+        // Offsets in the block are whole numbers in double, but that of the element's own first voxel might
+        // not be.
+        const V inRow = hn::Add(along.offset, hn::Mul(inR, strideR));
+        keep(hn::Sub(first, begin), rows.skipped);
+        keep(hn::Add(inRow, hn::Mul(hn::Sub(first, fromS), strideS)), rows.offset);
+        keep(hn::Add(hn::Sub(last, first), one), rows.length);
+        const unsigned hit = used & bitsOf(hn::Le(first, last));
+        for (int q = 0; q < kLanes; q += 4) {
+            const SetBits& set = kSetBits[(hit >> q) & 15];
+            const std::uint64_t four =
+                set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
+            std::memcpy(rows.hit + hits, &four, sizeof four);
+            hits += set.count;
+        }
+    };
+    // Calls work(step, at, hits) for so many vectors of rows, with the places of each.
+    const auto forVectors = [&](int vectors, const auto& work) TESSERA_INLINE {
+        for (int done = 0; done < vectors;) {
+            if (rows.count == kMostRows) writeRows(walk);
+            const int some = std::min(vectors - done, (kMostRows - rows.count) / kLanes);
+            int at = rows.count, hits = rows.hits;
+            for (const int end = done + some; done < end; ++done, at += kLanes) work(done, at, hits);
+            rows.count = at;
+            rows.hits = hits;
+        }
+    };
+    const auto usedOf = [&](int rowsLeft) { return (1u << std::min(rowsLeft, kLanes)) - 1; };
+    if constexpr (kIsAligned) {
+        for (int done = 0; done < countT; done += kLanes) {
+            goAlongT(hn::Iota(d, double(done)));
+            along.value = valueAlongT(channels[0]);
+            const unsigned used = usedOf(countT - done);
+            V inR = hn::Zero(d);
+            forVectors(countR, [&](int, int at, int& hits) TESSERA_INLINE {
+                solve(inR, used, at, hits);
+                inR = hn::Add(inR, one);
+            });
+        }
+    } else {
+        const V rowsT = ofLane(batch.rowsT), inverseT = ofLane(batch.inverseT), half = hn::Set(d, 0.5);
+        forVectors((count + kLanes - 1) / kLanes, [&](int step, int at, int& hits) TESSERA_INLINE {
+            const V number = hn::Iota(d, double(step * kLanes));
+            const V inR = hn::Floor(hn::Mul(hn::Add(number, half), inverseT));
+            goAlongT(hn::Sub(number, hn::Mul(inR, rowsT)));
+            solve(inR, usedOf(count - step * kLanes), at, hits);
+        });
     }
+}
+
+/// True where at least three of four lanes of vectors along t have a row.
+bool fillsVectors(int countT) {
+    constexpr int kLanes = int(hn::MaxLanes(D()));
+    return (countT + kLanes - 1) / kLanes * kLanes * 3 <= countT * 4;
 }
 
 void walkElement(Walk& walk, int lane) {
@@ -712,10 +758,12 @@ void walkElement(Walk& walk, int lane) {
     const bool isSimple = axis == 0 && walk.input.channels.size() == 1 && scratch.channels[0].isInFloat(lane);
     scratch.longest[lane] = isSimple ? kShortRun : 0;
     const int lower = kFaceOrder[std::size_t(batch.lower[lane])].lower;
-    if (HWY_LIKELY(batch.grade[lane] == kEasy && lower > 0 && lower < 4))
-        solveRows<false>(walk, lane);
+    if (HWY_UNLIKELY(batch.grade[lane] != kEasy || lower == 0 || lower == 4))
+        solveRows<RowOrder::careful>(walk, lane);
+    else if (fillsVectors(batch.countT[lane]))
+        solveRows<RowOrder::aligned>(walk, lane);
     else
-        solveRows<true>(walk, lane);
+        solveRows<RowOrder::packed>(walk, lane);
 }
 
 // Elements reach for their nodes in no order: fetch those of the next batch while this one is worked, and the
