@@ -19,21 +19,21 @@ struct Pair {
 class RegionGrid {
   public:
     explicit RegionGrid(std::span<const IndexBox> regions) : regions_(regions) {
-        bounds_ = regions[0];
+        IndexBox& box = grid_.box = regions[0];
         Vec3d sum(0);
         for (const IndexBox& region : regions) {
-            bounds_.min = glm::min(bounds_.min, region.min);
-            bounds_.max = glm::max(bounds_.max, region.max);
+            box.min = glm::min(box.min, region.min);
+            box.max = glm::max(box.max, region.max);
             sum += Vec3d(region.size());
         }
         const Vec3i usual(sum / double(regions.size()));
         std::size_t cells = 1;
         for (int a = 0; a < 3; ++a) {
-            const int extent = bounds_.max[a] - bounds_.min[a];
+            const int extent = box.max[a] - box.min[a];
             const int edge = std::max(usual[a], (extent + kMostCells - 1) / kMostCells);
-            shift_[a] = std::bit_width(unsigned(edge) - 1);  // a power of two: this runs for every element
-            cells_[a] = ((extent - 1) >> shift_[a]) + 1;
-            cells *= std::size_t(cells_[a]);
+            grid_.shift[a] = std::bit_width(unsigned(edge) - 1);
+            grid_.cells[a] = ((extent - 1) >> grid_.shift[a]) + 1;
+            cells *= std::size_t(grid_.cells[a]);
         }
         first_.assign(cells + 1, 0);
         forEachCellOfRegions([&](std::size_t cell, std::int32_t) { ++first_[cell + 1]; });
@@ -42,65 +42,65 @@ class RegionGrid {
         std::vector<std::int32_t> next(first_.begin(), first_.end() - 1);
         forEachCellOfRegions(
             [&](std::size_t cell, std::int32_t region) { list_[std::size_t(next[cell]++)] = region; });
+        only_.assign(cells, -1);
+        for (std::size_t r = 0; r < regions.size(); ++r) markFilled(std::int32_t(r));
     }
 
-    const IndexBox& bounds() const { return bounds_; }
+    const NearGrid& grid() const { return grid_; }
 
-    // Calls found(region) once for every region that shares a lattice point with the closed box low..high
-    // inside bounds().
+    // Calls found(region) once for every region that an element's lattice points share.
     template <class Found>
-    void forEachRegion(const Vec3i& low, const Vec3i& high, const Found& found) const {
-        const Vec3i a = cellOf(low), b = cellOf(high);
-        // Most boxes are small: most lie in one cell, and most cells in one region.
-        if (a == b) return forEachRegionOf(index(a), low, high, found);
-        for (int z = a.z; z <= b.z; ++z)
-            for (int y = a.y; y <= b.y; ++y)
-                for (int x = a.x; x <= b.x; ++x)
-                    forEachRegionOf(index({x, y, z}), low, high, [&](std::int32_t region) {
-                        // A region that shares several cells with the box counts in the first only.
-                        const Vec3i corner = glm::max(low, regions_[std::size_t(region)].min);
-                        if (cellOf(corner) == Vec3i{x, y, z}) found(region);
-                    });
+    void forEachRegion(const NearElements& near, int i, const Found& found) const {
+        const std::int32_t cell = near.cell[i];
+        // Most elements are small: most lie in one cell, and most cells in one region.
+        if (cell >= 0 && only_[std::size_t(cell)] >= 0) return found(only_[std::size_t(cell)]);
+        const Vec3i low{near.low[0][i], near.low[1][i], near.low[2][i]},
+            high{near.high[0][i], near.high[1][i], near.high[2][i]};
+        forEachCell(grid_.cellOf(low), grid_.cellOf(high), [&](std::int32_t at, const Vec3i& place) {
+            for (std::int32_t k = first_[std::size_t(at)]; k < first_[std::size_t(at) + 1]; ++k) {
+                const std::int32_t region = list_[std::size_t(k)];
+                const IndexBox& box = regions_[std::size_t(region)];
+                // One branch for six comparisons.
+                const bool isBeside = (high.x < box.min.x) | (high.y < box.min.y) | (high.z < box.min.z) |
+                                      (low.x >= box.max.x) | (low.y >= box.max.y) | (low.z >= box.max.z);
+                // A region that shares several cells with the points counts in the first only.
+                if (!isBeside && grid_.cellOf(glm::max(low, box.min)) == place) found(region);
+            }
+        });
     }
 
   private:
     static constexpr int kMostCells = 128;
 
-    // The same for the regions of one cell.
-    template <class Found>
-    void forEachRegionOf(std::size_t cell, const Vec3i& low, const Vec3i& high, const Found& found) const {
-        for (std::int32_t i = first_[cell]; i < first_[cell + 1]; ++i) {
-            const std::int32_t region = list_[std::size_t(i)];
-            const IndexBox& box = regions_[std::size_t(region)];
-            // One branch for six comparisons.
-            const bool isBeside = (high.x < box.min.x) | (high.y < box.min.y) | (high.z < box.min.z) |
-                                  (low.x >= box.max.x) | (low.y >= box.max.y) | (low.z >= box.max.z);
-            if (!isBeside) found(region);
-        }
-    }
-
-    Vec3i cellOf(const Vec3i& p) const {
-        return {(p.x - bounds_.min.x) >> shift_.x, (p.y - bounds_.min.y) >> shift_.y,
-                (p.z - bounds_.min.z) >> shift_.z};
-    }
-    std::size_t index(const Vec3i& cell) const {
-        return (std::size_t(cell.z) * std::size_t(cells_.y) + std::size_t(cell.y)) * std::size_t(cells_.x) +
-               std::size_t(cell.x);
+    // Calls visit(index, place) for the cells a..b.
+    template <class Visit>
+    void forEachCell(const Vec3i& a, const Vec3i& b, const Visit& visit) const {
+        for (int z = a.z; z <= b.z; ++z)
+            for (int y = a.y; y <= b.y; ++y)
+                for (int x = a.x; x <= b.x; ++x) visit(grid_.index({x, y, z}), Vec3i(x, y, z));
     }
     template <class Visit>
     void forEachCellOfRegions(const Visit& visit) const {
-        for (std::size_t r = 0; r < regions_.size(); ++r) {
-            const Vec3i a = cellOf(regions_[r].min), b = cellOf(regions_[r].max - 1);
-            for (int z = a.z; z <= b.z; ++z)
-                for (int y = a.y; y <= b.y; ++y)
-                    for (int x = a.x; x <= b.x; ++x) visit(index({x, y, z}), std::int32_t(r));
-        }
+        for (std::size_t r = 0; r < regions_.size(); ++r)
+            forEachCell(grid_.cellOf(regions_[r].min), grid_.cellOf(regions_[r].max - 1),
+                        [&](std::int32_t cell, const Vec3i&) { visit(std::size_t(cell), std::int32_t(r)); });
+    }
+    // Notes the cells that the region alone reaches into, and fills.
+    void markFilled(std::int32_t region) {
+        const IndexBox& box = regions_[std::size_t(region)];
+        forEachCell(grid_.cellOf(box.min), grid_.cellOf(box.max - 1), [&](std::int32_t at, const Vec3i& place) {
+            const std::size_t cell = std::size_t(at);
+            const Vec3i edge{1 << grid_.shift.x, 1 << grid_.shift.y, 1 << grid_.shift.z};
+            const Vec3i low = grid_.box.min + place * edge, high = glm::min(low + edge, grid_.box.max);
+            const bool isFilled = box.contains(low) && box.contains(high - 1);
+            if (isFilled && first_[cell + 1] - first_[cell] == 1) only_[cell] = region;
+        });
     }
 
     std::span<const IndexBox> regions_;
-    IndexBox bounds_;
-    Vec3i shift_{0}, cells_{1};
+    NearGrid grid_;
     std::vector<std::int32_t> first_, list_;
+    std::vector<std::int32_t> only_;  ///< the region that fills a cell and is its only one, else -1
 };
 
 // The pairs that a chunk of elements finds: as many as it has elements in a place of its own, and what is left
@@ -151,10 +151,9 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
         NearElements near;
         for (std::int64_t first = begin; first < end; first += kNearBatch) {
             findNear(mesh, frame.rough, first, int(std::min<std::int64_t>(kNearBatch, end - first)),
-                     grid.bounds(), test.marginVoxels, test.dropsBetween, near);
+                     grid.grid(), test, near);
             for (int i = 0; i < near.count; ++i)
-                grid.forEachRegion({near.low[0][i], near.low[1][i], near.low[2][i]},
-                                   {near.high[0][i], near.high[1][i], near.high[2][i]},
+                grid.forEachRegion(near, i,
                                    [&](std::int32_t region) { pairs.add({region, near.element[i]}); });
         }
     });

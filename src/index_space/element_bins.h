@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/large_pages.h"
+#include "index_space/near_kernel.h"
 #include "index_space/node_frame.h"
 #include "tessera/execution.h"
 #include "tessera/lattice.h"
@@ -20,13 +21,6 @@ struct ElementBins {
     std::span<const std::int32_t> of(std::size_t region) const {
         return {elements.data() + first[region], std::size_t(first[region + 1] - first[region])};
     }
-};
-
-/// Which elements are near a region.
-struct NearTest {
-    float marginVoxels = 0;  ///< bounding boxes are widened by this, besides their slight widening
-    /// Also leaves out most of those that lie between the lattice points of their boxes.
-    bool dropsBetween = false;
 };
 
 /// Built by counting: one pass finds the pairs, one puts them in their places. Elements without a lattice

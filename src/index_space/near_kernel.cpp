@@ -25,9 +25,8 @@ struct alignas(64) NodePlaces {
 struct Request {
     std::int32_t first;
     int count;
-    IndexBox all;
-    float margin;
-    bool dropsBetween;
+    const NearGrid& grid;
+    const NearTest& test;
 };
 
 }  // namespace tessera::near_kernel
@@ -120,27 +119,33 @@ void findNear(const Request& request, const NodePlaces& places, NearElements& ne
                                  node[k].axis[2], unused);
         }
         auto some = hn::FirstN(di, std::size_t(request.count - at));
-        auto isSmall = hn::Eq(hn::Zero(di), hn::Zero(di));
-        I low[3], high[3];
+        auto isSmall = hn::Eq(hn::Zero(di), hn::Zero(di)), isInCell = isSmall;
+        I low[3], high[3], cell[3];
         V extent = hn::Zero(d), farthest = hn::Zero(d);
         for (int a = 0; a < 3; ++a) {
             const V n0 = node[0].axis[a], n1 = node[1].axis[a], n2 = node[2].axis[a], n3 = node[3].axis[a];
             const V least = hn::Min(hn::Min(n0, n1), hn::Min(n2, n3));
             const V most = hn::Max(hn::Max(n0, n1), hn::Max(n2, n3));
             const auto slack = [&](V x) {
-                return hn::Add(hn::Mul(hn::Abs(x), set(0x1p-22f)), set(0x1p-26f + request.margin));
+                return hn::Add(hn::Mul(hn::Abs(x), set(0x1p-22f)), set(0x1p-26f + request.test.marginVoxels));
             };
             const auto cut = [](V x) { return hn::Max(hn::Min(x, set(kFarthest)), set(-kFarthest)); };
             const I from = hn::ConvertTo(di, hn::Ceil(cut(hn::Sub(least, slack(least)))));
             const I to = hn::ConvertTo(di, hn::Floor(cut(hn::Add(most, slack(most)))));
-            low[a] = hn::Max(from, hn::Set(di, request.all.min[a]));
-            high[a] = hn::Min(to, hn::Set(di, request.all.max[a] - 1));
+            low[a] = hn::Max(from, hn::Set(di, request.grid.box.min[a]));
+            high[a] = hn::Min(to, hn::Set(di, request.grid.box.max[a] - 1));
             some = hn::AndNot(hn::Gt(low[a], high[a]), some);
             isSmall = hn::AndNot(hn::Gt(high[a], hn::Add(low[a], hn::Set(di, 1))), isSmall);
+            const auto cellOf = [&](I v) {
+                return hn::ShiftRightSame(hn::Sub(v, hn::Set(di, request.grid.box.min[a])),
+                                          request.grid.shift[a]);
+            };
+            cell[a] = cellOf(low[a]);
+            isInCell = hn::And(isInCell, hn::Eq(cell[a], cellOf(high[a])));
             extent = hn::Max(extent, hn::Sub(most, least));
             farthest = hn::Max(farthest, hn::Max(hn::Abs(least), hn::Abs(most)));
         }
-        if (request.dropsBetween) {
+        if (request.test.dropsBetween) {
             isSmall = hn::And(isSmall, some);
             if (!hn::AllFalse(di, isSmall))
                 some = hn::AndNot(
@@ -153,6 +158,9 @@ void findNear(const Request& request, const NodePlaces& places, NearElements& ne
             keep(low[a], near.low[a]);
             keep(high[a], near.high[a]);
         }
+        const I row = hn::Add(hn::Mul(cell[2], hn::Set(di, request.grid.cells.y)), cell[1]);
+        const I index = hn::Add(hn::Mul(row, hn::Set(di, request.grid.cells.x)), cell[0]);
+        keep(hn::IfThenElse(isInCell, index, hn::Set(di, -1)), near.cell);
         keep(hn::Iota(di, request.first + at), near.element);
         near.count += int(hn::CountTrue(di, some));
     }
@@ -175,13 +183,13 @@ void run(const Request& request, const NodePlaces& places, NearElements& near) {
 namespace tessera {
 
 void findNear(const TetMesh& mesh, std::span<const NodeFrame::Rough> rough, std::int64_t first, int count,
-              const IndexBox& all, float marginVoxels, bool dropsBetween, NearElements& near) {
+              const NearGrid& grid, const NearTest& test, NearElements& near) {
     near_kernel::NodePlaces places;
     for (int i = 0; i < count; ++i) {
         const std::array<std::int32_t, 4>& tet = mesh.tets[std::size_t(first + i)];
         for (std::size_t k = 0; k < 4; ++k) places.node[k][i] = rough[std::size_t(tet[k])];
     }
-    near_kernel::run({std::int32_t(first), count, all, marginVoxels, dropsBetween}, places, near);
+    near_kernel::run({std::int32_t(first), count, grid, test}, places, near);
 }
 
 }  // namespace tessera
