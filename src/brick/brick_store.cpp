@@ -37,13 +37,38 @@ TileCover readCoverage(const std::uint8_t* first, std::size_t rowStride, std::si
     return TileCover::some;
 }
 
+using Four = float __attribute__((vector_size(16)));
+
+Four load(const float* from) {
+    Four four;
+    std::memcpy(&four, from, sizeof four);
+    return four;
+}
+void store(const Four& four, float* to) {
+    std::memcpy(to, &four, sizeof four);
+}
+
+// to[x * toStride + z] = from[z * fromStride + x] for x and z below 4.
+void transpose(const float* from, std::size_t fromStride, float* to, std::size_t toStride) {
+    const Four a = load(from), b = load(from + fromStride), c = load(from + 2 * fromStride),
+               d = load(from + 3 * fromStride);
+    const Four low02 = __builtin_shufflevector(a, c, 0, 4, 1, 5),
+               low13 = __builtin_shufflevector(b, d, 0, 4, 1, 5),
+               high02 = __builtin_shufflevector(a, c, 2, 6, 3, 7),
+               high13 = __builtin_shufflevector(b, d, 2, 6, 3, 7);
+    store(__builtin_shufflevector(low02, low13, 0, 4, 1, 5), to);
+    store(__builtin_shufflevector(low02, low13, 2, 6, 3, 7), to + toStride);
+    store(__builtin_shufflevector(high02, high13, 0, 4, 1, 5), to + 2 * toStride);
+    store(__builtin_shufflevector(high02, high13, 2, 6, 3, 7), to + 3 * toStride);
+}
+
 // 8 x 8 transposes, one for every y: x is fastest in a block, z in a tile.
 void copyValues(const float* first, std::size_t rowStride, std::size_t layerStride, float* tile) {
-    for (std::size_t y = 0; y < 8; ++y)
-        for (std::size_t z = 0; z < 8; ++z) {
-            const float* row = first + z * layerStride + y * rowStride;
-            for (std::size_t x = 0; x < 8; ++x) tile[(x * 8 + y) * 8 + z] = row[x];
-        }
+    for (std::size_t x = 0; x < 8; x += 4)
+        for (std::size_t y = 0; y < 8; ++y)
+            for (std::size_t z = 0; z < 8; z += 4)
+                transpose(first + z * layerStride + y * rowStride + x, layerStride, tile + (x * 8 + y) * 8 + z,
+                          64);
 }
 
 void clearUncovered(const std::array<std::uint64_t, 8>& bits, float* tile) {
