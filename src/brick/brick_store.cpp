@@ -67,8 +67,8 @@ void copyValues(const float* first, std::size_t rowStride, std::size_t layerStri
     for (std::size_t x = 0; x < 8; x += 4)
         for (std::size_t y = 0; y < 8; ++y)
             for (std::size_t z = 0; z < 8; z += 4)
-                transpose(first + z * layerStride + y * rowStride + x, layerStride, tile + (x * 8 + y) * 8 + z,
-                          64);
+                transpose(first + z * layerStride + y * rowStride + x, layerStride,
+                          tile + (x * 8 + y) * 8 + z, 64);
 }
 
 void clearUncovered(const std::array<std::uint64_t, 8>& bits, float* tile) {

@@ -88,13 +88,14 @@ class RegionGrid {
     // Notes the cells that the region alone reaches into, and fills.
     void markFilled(std::int32_t region) {
         const IndexBox& box = regions_[std::size_t(region)];
-        forEachCell(grid_.cellOf(box.min), grid_.cellOf(box.max - 1), [&](std::int32_t at, const Vec3i& place) {
-            const std::size_t cell = std::size_t(at);
-            const Vec3i edge{1 << grid_.shift.x, 1 << grid_.shift.y, 1 << grid_.shift.z};
-            const Vec3i low = grid_.box.min + place * edge, high = glm::min(low + edge, grid_.box.max);
-            const bool isFilled = box.contains(low) && box.contains(high - 1);
-            if (isFilled && first_[cell + 1] - first_[cell] == 1) only_[cell] = region;
-        });
+        forEachCell(
+            grid_.cellOf(box.min), grid_.cellOf(box.max - 1), [&](std::int32_t at, const Vec3i& place) {
+                const std::size_t cell = std::size_t(at);
+                const Vec3i edge{1 << grid_.shift.x, 1 << grid_.shift.y, 1 << grid_.shift.z};
+                const Vec3i low = grid_.box.min + place * edge, high = glm::min(low + edge, grid_.box.max);
+                const bool isFilled = box.contains(low) && box.contains(high - 1);
+                if (isFilled && first_[cell + 1] - first_[cell] == 1) only_[cell] = region;
+            });
     }
 
     std::span<const IndexBox> regions_;
@@ -103,8 +104,8 @@ class RegionGrid {
     std::vector<std::int32_t> only_;  ///< the region that fills a cell and is its only one, else -1
 };
 
-// The pairs that a chunk of elements finds: as many as it has elements in a place of its own, and what is left
-// over.
+// The pairs that a chunk of elements finds: as many as it has elements in a place of its own, and what is
+// left over.
 class ChunkPairs {
   public:
     void start(std::span<Pair> room, std::size_t regions) {
@@ -153,8 +154,9 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
             findNear(mesh, frame.rough, first, int(std::min<std::int64_t>(kNearBatch, end - first)),
                      grid.grid(), test, near);
             for (int i = 0; i < near.count; ++i)
-                grid.forEachRegion(near, i,
-                                   [&](std::int32_t region) { pairs.add({region, near.element[i]}); });
+                grid.forEachRegion(near, i, [&](std::int32_t region) {
+                    pairs.add({region, near.element[i]});
+                });
         }
     });
     for (std::size_t r = 0; r < regions.size(); ++r) {

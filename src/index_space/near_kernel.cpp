@@ -65,8 +65,9 @@ HWY_INLINE Place cross(const Place& a, const Place& b) {
 // True for the lanes whose elements surely hold none of the eight lattice points that follow the first.
 //
 // The element's barycentrics times its sixfold volume are computed relative to the first point. With places
-// off by e, an element of extent X and u = 2^-24 they are off by less than 216 e X^2 + 660 u X^3 where the
-// point lies in the bounding box; nothing is said of other points.
+// off by e = u |place|, an element of extent X and u = 2^-24 they are off by less than 216 e X^2 + 660 u X^3
+// where the point lies in the bounding box, which is what has to hold; and a point that the scan takes as
+// covered is no further than 2^-26 voxel outside the element, 14 X^2 2^-26 here.
 HWY_INLINE auto liesBetween(const Place (&node)[4], const I (&first)[3], V extent, V farthest) {
     const D d;
     const Place origin{hn::ConvertTo(d, first[0]), hn::ConvertTo(d, first[1]), hn::ConvertTo(d, first[2])};
@@ -74,9 +75,9 @@ HWY_INLINE auto liesBetween(const Place (&node)[4], const I (&first)[3], V exten
     const Place a = node[1] - node[0], b = node[2] - node[0], c = node[3] - node[0];
     Place normal[4] = {Place(), cross(b, c), cross(c, a), cross(a, b)};
     const V volume = dot(a, normal[1]);
-    const V error = hn::Mul(
-        hn::Mul(extent, extent),
-        hn::Add(hn::Mul(set(0x1p8f * 0x1p-23f), hn::Add(farthest, set(1))), hn::Mul(set(0x1p10f * 0x1p-24f), extent)));
+    const V error =
+        hn::Mul(hn::Mul(extent, extent),
+                hn::Add(hn::Mul(set(0x1p-16f), hn::Add(farthest, set(2))), hn::Mul(set(0x1p-14f), extent)));
     const V sign = hn::CopySign(set(1), volume);
     V share[4];
     for (int k = 1; k < 4; ++k) {

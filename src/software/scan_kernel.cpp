@@ -72,10 +72,10 @@ struct alignas(64) Batch {
     double shrink[4][kBatch];  // added to planeA: the face moved inwards by as much as it was moved outwards
     double gradient[4][3][kBatch], constant[4][kBatch];  // barycentrics: constant + gradient . (s, t, r)
     // The part of the element's box that lies in the region, relative to the element's first voxel:
-    double from[3][kBatch], lastS[kBatch];              // its first voxel, s t r, and its last one along s
-    double origin[kBatch], stride[3][kBatch];           // offset of that first voxel in the block; of s, t, r
-    double rowsT[kBatch], inverseT[kBatch];             // rows along t, and one over that
-    std::int32_t countT[kBatch], countR[kBatch];        // rows; 0 where no voxel lies in the part
+    double from[3][kBatch], lastS[kBatch];        // its first voxel, s t r, and its last one along s
+    double origin[kBatch], stride[3][kBatch];     // offset of that first voxel in the block; of s, t, r
+    double rowsT[kBatch], inverseT[kBatch];       // rows along t, and one over that
+    std::int32_t countT[kBatch], countR[kBatch];  // rows; 0 where no voxel lies in the part
 };
 
 /// A channel of eight elements: value = constant + s, t, r times the gradient, limited to [low, high].
@@ -83,9 +83,9 @@ struct alignas(64) BatchChannel {
     double node[4][kBatch];
     double constant[kBatch], gradientS[kBatch], gradientT[kBatch], gradientR[kBatch];
     float low[kBatch], high[kBatch];
-    float step[kBatch];               // difference from voxel to voxel along the scan axis
-    unsigned finiteBits, floatBits;   // elements whose values are finite, and whose runs come out right in
-                                      // float, too: no denormal steps, nor too many, nor overflowing ones
+    float step[kBatch];              // difference from voxel to voxel along the scan axis
+    unsigned finiteBits, floatBits;  // elements whose values are finite, and whose runs come out right in
+                                     // float, too: no denormal steps, nor too many, nor overflowing ones
     alignas(64) double first[kMostRows];  // value at the first voxel of the run, of the rows at work
 
     bool isFinite(int lane) const { return finiteBits >> lane & 1; }
@@ -136,6 +136,7 @@ struct Scratch {
     std::int32_t element[kBatch];
     std::int64_t stride[kBatch];  // along the scan axis
     int longest[kBatch];          // runs up to this length are written without a loop
+    unsigned floatBits;           // elements whose runs come out right in float in all channels
 };
 
 }  // namespace tessera::scan_kernel
@@ -148,10 +149,13 @@ namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<double, kBatch>;
 using V = hn::VFromD<D>;
 using M = decltype(hn::Eq(V(), V()));
-/// Runs of up to so many voxels along x are written without a loop, by two vectors that may overlap; 0 where
-/// there are no vectors.
-using Four = hn::CappedTag<float, 4>;
-constexpr int kShortRun = hn::MaxLanes(Four()) == 4 ? 8 : 0;
+/// Runs of up to so many voxels along x are written without a loop: by one masked vector or by two that may
+/// overlap. 0 where there are no vectors.
+#if HWY_TARGET <= HWY_AVX3
+constexpr int kShortRun = 16;
+#else
+constexpr int kShortRun = HWY_TARGET == HWY_SCALAR ? 0 : 8;
+#endif
 
 HWY_INLINE V abs3(V a, V b, V c) {
     return hn::Add(hn::Add(hn::Abs(a), hn::Abs(b)), hn::Abs(c));
@@ -239,7 +243,7 @@ void setUpLanes(const Walk& walk, const double* const (&nodes)[4][kBatch], std::
     const auto alongX = hn::Not(hn::Or(alongY, alongZ));
     hn::Store(hn::IfThenElse(alongZ, hn::Set(d, 2.0), hn::IfThenElseZero(alongY, hn::Set(d, 1.0))), d,
               &batch.axis[lane]);
-    const auto turn = [&](V (&of)[3]) {
+    const auto turn = [&](V(&of)[3]) {
         const V s = hn::IfThenElse(alongZ, of[2], hn::IfThenElse(alongY, of[1], of[0]));
         const V t = hn::IfThenElse(alongX, of[1], of[0]);
         of[2] = hn::IfThenElse(alongZ, of[1], of[2]);
@@ -254,8 +258,8 @@ void setUpLanes(const Walk& walk, const double* const (&nodes)[4][kBatch], std::
         stride[a] = hn::Set(d, walk.stride[a]);
     }
     if (!hn::AllTrue(d, alongX)) {
-        for (V (&node)[3] : v) turn(node);
-        for (V (*of)[3] : {&low, &high, &from, &to, &base, &stride}) turn(*of);
+        for (V(&node)[3] : v) turn(node);
+        for (V(*of)[3] : {&low, &high, &from, &to, &base, &stride}) turn(*of);
     }
     const V slack = hn::Set(d, kBoxSlack), one = hn::Set(d, 1.0);
     auto isSome = hn::Eq(one, one);
@@ -347,7 +351,8 @@ void loadBatch(const Walk& walk, const std::int32_t* elements, int count) {
     const double* nodes[4][kBatch];
     for (int lane = 0; lane < kBatch; ++lane) {
         const auto& tet = walk.input.mesh.tets[std::size_t(elements[lane < count ? lane : 0])];
-        for (std::size_t k = 0; k < 4; ++k) nodes[k][lane] = walk.input.frame.nodes[std::size_t(tet[k])].whole;
+        for (std::size_t k = 0; k < 4; ++k)
+            nodes[k][lane] = walk.input.frame.nodes[std::size_t(tet[k])].whole;
     }
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpLanes(walk, nodes, lane);
 }
@@ -382,8 +387,7 @@ void setUpChannelLanes(const Batch& batch, BatchChannel& channel, std::size_t la
         const V difference = hn::Sub(f[k], f[0]);
         sum[0] = hn::Add(sum[0], hn::Mul(difference, hn::Load(d, &batch.constant[k][lane])));
         for (int a = 0; a < 3; ++a)
-            sum[a + 1] =
-                hn::Add(sum[a + 1], hn::Mul(difference, hn::Load(d, &batch.gradient[k][a][lane])));
+            sum[a + 1] = hn::Add(sum[a + 1], hn::Mul(difference, hn::Load(d, &batch.gradient[k][a][lane])));
     }
     hn::Store(sum[0], d, &channel.constant[lane]);
     hn::Store(sum[1], d, &channel.gradientS[lane]);
@@ -398,8 +402,7 @@ void loadChannel(const ScanInput& input, const ScanChannel& source, const std::i
     for (int lane = 0; lane < kBatch; ++lane) {
         const std::int32_t element = elements[lane < count ? lane : 0];
         const auto& tet = input.mesh.tets[std::size_t(element)];
-        for (std::size_t k = 0; k < 4; ++k)
-            channel.node[k][lane] = source.at(source.cell ? element : tet[k]);
+        for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = source.at(source.cell ? element : tet[k]);
     }
     channel.finiteBits = channel.floatBits = 0;
     for (std::size_t lane = 0; lane < kBatch; lane += hn::Lanes(D())) setUpChannelLanes(batch, channel, lane);
@@ -462,103 +465,139 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
     }
 }
 
-// Values of one run of voxels that nothing covered before, counted from the run's own first voxel so that
-// they don't depend on the region.
-HWY_INLINE void fillRun(float* out, std::int64_t stride, int length, int skipped, float value, float step,
-                        float low, float high) {
-    const hn::ScalableTag<float> df;
-    const int lanes = int(hn::Lanes(df));
-    int k = 0;
-    if (stride == 1) {
-        const auto lowest = hn::Set(df, low), highest = hn::Set(df, high), slope = hn::Set(df, step),
-                   first = hn::Set(df, value);
-        for (; k + lanes <= length; k += lanes) {
-            auto v = hn::Add(first, hn::Mul(hn::Iota(df, float(skipped + k)), slope));
-            hn::StoreU(hn::Min(highest, hn::Max(lowest, v)), df, out + k);
-        }
-    }
-    for (; k < length; ++k) out[k * stride] = limited(value + float(skipped + k) * step, low, high);
+// Values of voxels of a run by their numbers in it.
+template <class Floats>
+HWY_INLINE hn::VFromD<Floats> valuesAt(Floats df, const BatchChannel& channel, int lane, int row,
+                                       float number) {
+    const auto first = hn::Set(df, float(channel.first[row])), step = hn::Set(df, channel.step[lane]);
+    const auto v = hn::Add(first, hn::Mul(hn::Iota(df, number), step));
+    return hn::Min(hn::Set(df, channel.high[lane]), hn::Max(hn::Set(df, channel.low[lane]), v));
 }
 
+// Writes a run of any length along any axis.
 HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
+    const hn::ScalableTag<float> df;
+    const hn::RebindToSigned<decltype(df)> di;
+    const int lanes = int(hn::Lanes(df));
     const Scratch& scratch = walk.scratch;
     const int length = scratch.rows.length[row], skipped = scratch.rows.skipped[row];
     const std::int64_t offset = scratch.rows.offset[row], stride = scratch.stride[lane];
+    const int whole = stride == 1 ? length - length % lanes : 0;  // voxels in whole vectors
     std::int32_t* const owner = walk.output.owner + offset;
-    std::int32_t free = kNoOwner;
-    for (int k = 0; k < length; ++k) free &= owner[k * stride];
-    if (free != kNoOwner) {
+    auto free = hn::Set(di, kNoOwner);
+    std::int32_t freeBeyond = kNoOwner;
+    for (int k = 0; k < whole; k += lanes) free = hn::And(free, hn::LoadU(di, owner + k));
+    for (int k = whole; k < length; ++k) freeBeyond &= owner[k * stride];
+    if (freeBeyond != kNoOwner || !hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
         writeContestedRun(walk, lane, row);
         return;
     }
-    for (int k = 0; k < length; ++k) owner[k * stride] = scratch.element[lane];
+    const std::int32_t element = scratch.element[lane];
+    for (int k = 0; k < whole; k += lanes) hn::StoreU(hn::Set(di, element), di, owner + k);
+    for (int k = whole; k < length; ++k) owner[k * stride] = element;
     for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
-        if (channel.isInFloat(lane)) {
-            fillRun(out, stride, length, skipped, float(channel.first[row]), channel.step[lane],
-                    channel.low[lane], channel.high[lane]);
-        } else {
-            for (int k = 0; k < length; ++k)
-                out[k * stride] = valueAt(channel, lane, row, double(skipped) + k);
-        }
+        const int vectors = channel.isInFloat(lane) ? whole : 0;
+        for (int k = 0; k < vectors; k += lanes)
+            hn::StoreU(valuesAt(df, channel, lane, row, float(skipped + k)), df, out + k);
+        for (int k = vectors; k < length; ++k)
+            out[k * stride] = valueAt(channel, lane, row, double(skipped) + k);
     }
 }
 
-// Writes the runs of the rows at work. Most are short, and of no length that can be foreseen: few branches
-// depend on it.
-void writeRows(Walk& walk) {
-    Scratch& scratch = walk.scratch;
-    Rows& rows = scratch.rows;
-    std::int32_t* const owners = walk.output.owner;
-    const int hits = rows.hits;
-    const BatchChannel& channel = scratch.channels[0];
-    float* const values = walk.output.values.empty() ? nullptr : walk.output.values[0];
-    for (int i = 0; i < hits; ++i) {
-        const int row = rows.hit[i] % kMostRows, lane = rows.hit[i] / kMostRows;
-        const int length = rows.length[row];
-        if (length > scratch.longest[lane]) {
-            writeRun(walk, lane, row);
-            continue;
+// Where short runs go: the block's owners and the values of its channels.
+struct ShortRuns {
+    const Scratch& scratch;
+    std::int32_t* owners;
+    float* const* values;
+    std::size_t channels;
+};
+
+// Writes a run along x of up to kShortRun voxels whose values come out right in float. False where a voxel is
+// covered already. No run's length can be foreseen: few branches depend on it.
+#if HWY_TARGET <= HWY_AVX3
+HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
+    const hn::FixedTag<float, kShortRun> df;
+    const hn::RebindToSigned<decltype(df)> di;
+    const std::size_t length = std::size_t(to.scratch.rows.length[row]);
+    const std::int64_t offset = to.scratch.rows.offset[row];
+    const auto isInRun = hn::FirstN(di, length);
+    const auto present = hn::MaskedLoad(isInRun, di, to.owners + offset);
+    if (!hn::AllTrue(di, hn::Eq(present, hn::IfThenElseZero(isInRun, hn::Set(di, kNoOwner))))) return false;
+    hn::BlendedStore(hn::Set(di, to.scratch.element[lane]), isInRun, di, to.owners + offset);
+    const float skipped = float(to.scratch.rows.skipped[row]);
+    for (std::size_t c = 0; c < to.channels; ++c)
+        hn::BlendedStore(valuesAt(df, to.scratch.channels[c], lane, row, skipped), hn::FirstN(df, length), df,
+                         to.values[c] + offset);
+    return true;
+}
+#elif HWY_TARGET != HWY_SCALAR
+HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
+    const hn::FixedTag<float, 4> df;
+    const hn::RebindToSigned<decltype(df)> di;
+    const int length = to.scratch.rows.length[row];
+    const std::int64_t offset = to.scratch.rows.offset[row];
+    std::int32_t* const owner = to.owners + offset;
+    const std::int32_t element = to.scratch.element[lane];
+    const float skipped = float(to.scratch.rows.skipped[row]);
+    if (length >= 4) {
+        const int last = length - 4;
+        const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
+        if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) return false;
+        hn::StoreU(hn::Set(di, element), di, owner);
+        hn::StoreU(hn::Set(di, element), di, owner + last);
+        for (std::size_t c = 0; c < to.channels; ++c) {
+            float* const out = to.values[c] + offset;
+            const BatchChannel& channel = to.scratch.channels[c];
+            hn::StoreU(valuesAt(df, channel, lane, row, skipped), df, out);
+            hn::StoreU(valuesAt(df, channel, lane, row, skipped + float(last)), df, out + last);
         }
-        std::int32_t* const owner = owners + rows.offset[row];
-        float* const out = values + rows.offset[row];
-        const std::int32_t element = scratch.element[lane];
-        const auto value = float(channel.first[row]);
-        const auto skipped = float(rows.skipped[row]);
-        const float step = channel.step[lane], low = channel.low[lane], high = channel.high[lane];
-        const Four df;
-        const hn::RebindToSigned<decltype(df)> di;
-        const auto valuesAt = [&](auto number) {
-            const auto v = hn::Add(hn::Set(df, value), hn::Mul(number, hn::Set(df, step)));
-            return hn::Min(hn::Set(df, high), hn::Max(hn::Set(df, low), v));
-        };
-        if (length >= 4) {
-            const int last = length - 4;
-            const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
-            if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
-                writeContestedRun(walk, lane, row);
-                continue;
-            }
-            hn::StoreU(hn::Set(di, element), di, owner);
-            hn::StoreU(hn::Set(di, element), di, owner + last);
-            hn::StoreU(valuesAt(hn::Iota(df, skipped)), df, out);
-            hn::StoreU(valuesAt(hn::Iota(df, skipped + float(last))), df, out + last);
-            continue;
-        }
-        const int middle = length / 2, last = length - 1;
-        if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) {
-            writeContestedRun(walk, lane, row);
-            continue;
-        }
-        owner[0] = owner[middle] = owner[last] = element;
+        return true;
+    }
+    const int middle = length / 2, last = length - 1;
+    if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) return false;
+    owner[0] = owner[middle] = owner[last] = element;
+    for (std::size_t c = 0; c < to.channels; ++c) {
+        float* const out = to.values[c] + offset;
         alignas(16) float v[4];
-        hn::Store(valuesAt(hn::Iota(df, skipped)), df, v);
+        hn::Store(valuesAt(df, to.scratch.channels[c], lane, row, skipped), df, v);
         out[0] = v[0];
         out[middle] = v[middle];
         out[last] = v[last];
     }
-    rows.count = rows.hits = 0;
+    return true;
+}
+#else
+bool writeShortRun(const ShortRuns&, int, int) {
+    return false;
+}
+#endif
+
+HWY_INLINE void writeHits(Walk& walk, const ShortRuns& to) {
+    const Rows& rows = walk.scratch.rows;
+    const int hits = rows.hits;
+    for (int i = 0; i < hits; ++i) {
+        const int row = rows.hit[i] % kMostRows, lane = rows.hit[i] / kMostRows;
+        if (HWY_UNLIKELY(rows.length[row] > walk.scratch.longest[lane]))
+            writeRun(walk, lane, row);
+        else if (HWY_UNLIKELY(!writeShortRun(to, lane, row)))
+            writeContestedRun(walk, lane, row);
+    }
+}
+
+// Writes the runs of the rows at work. Most are short, and most meshes' fields sampled one by one.
+void writeRows(Walk& walk) {
+    Scratch& scratch = walk.scratch;
+    float* const* const values = walk.output.values.data();
+    const std::size_t channels = walk.input.channels.size();
+    if (channels == 1) {
+        float* const only = values[0];
+        writeHits(walk, {scratch, walk.output.owner, &only, 1});
+    } else {
+        writeHits(walk, {scratch, walk.output.owner, values, channels});
+    }
+    scratch.rows.count = scratch.rows.hits = 0;
 }
 
 // Where faces leave scanlines room: s from the greatest bound of the first `lower` faces to the least of the
@@ -627,7 +666,7 @@ HWY_NOINLINE void solveRows(Walk& walk, int lane) {
     Rows& rows = scratch.rows;
     BatchChannel* const channels = scratch.channels.data();
     const std::size_t channelCount = std::max<std::size_t>(1, walk.input.channels.size());
-    const auto ofLane = [&](const double (&of)[kBatch]) { return hn::Set(d, of[lane]); };
+    const auto ofLane = [&](const double(&of)[kBatch]) { return hn::Set(d, of[lane]); };
     const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
     M isLower[4];
     V planeA[4], planeB[4], planeC[4];
@@ -667,8 +706,7 @@ HWY_NOINLINE void solveRows(Walk& walk, int lane) {
         if constexpr (kIsCareful) {
             for (int i = 0; i < 4; ++i) {
                 const V inner = hn::Add(planeA[i], ofLane(batch.shrink[order.face[i]]));
-                bounds[i] =
-                    hn::Add(hn::Add(inner, hn::Mul(planeB[i], along.t)), hn::Mul(planeC[i], r));
+                bounds[i] = hn::Add(hn::Add(inner, hn::Mul(planeB[i], along.t)), hn::Mul(planeC[i], r));
             }
             const Room inner = narrow<kIsCareful>(whole, bounds, isLower);
             const unsigned doubtful = used & bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
@@ -755,8 +793,7 @@ void walkElement(Walk& walk, int lane) {
     }
     const int axis = int(batch.axis[lane]);
     scratch.stride[lane] = walk.output.stride[axis];
-    const bool isSimple = axis == 0 && walk.input.channels.size() == 1 && scratch.channels[0].isInFloat(lane);
-    scratch.longest[lane] = isSimple ? kShortRun : 0;
+    scratch.longest[lane] = axis == 0 && (scratch.floatBits >> lane & 1) ? kShortRun : 0;
     const int lower = kFaceOrder[std::size_t(batch.lower[lane])].lower;
     if (HWY_UNLIKELY(batch.grade[lane] != kEasy || lower == 0 || lower == 4))
         solveRows<RowOrder::careful>(walk, lane);
@@ -799,8 +836,12 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         const std::int32_t* batchElements = elements.data() + begin;
         if (isLarge) prefetch(input, elements, begin + kBatch);
         loadBatch(walk, batchElements, count);
-        for (std::size_t c = 0; c < input.channels.size(); ++c)
-            loadChannel(input, input.channels[c], batchElements, count, scratch.batch, scratch.channels[c]);
+        scratch.floatBits = ~0u;
+        for (std::size_t c = 0; c < input.channels.size(); ++c) {
+            BatchChannel& channel = scratch.channels[c];
+            loadChannel(input, input.channels[c], batchElements, count, scratch.batch, channel);
+            scratch.floatBits &= channel.floatBits;
+        }
         std::copy_n(batchElements, count, scratch.element);
         for (int lane = 0; lane < count; ++lane) walkElement(walk, lane);
         writeRows(walk);

@@ -147,9 +147,9 @@ class BoundSoftware : public BoundResampler {
         const NodeFrame frame = frameNodes(mesh, lattice, execution);
         const ScanInput input{mesh, frame, channels};
         // The elements near a single region are its own.
-        const ElementBins bins = part && regions.size() == 1
-                                     ? everyElement(mesh)
-                                     : binElements(mesh, frame, regionBoxes, execution, {.dropsBetween = true});
+        const ElementBins bins = part && regions.size() == 1 ? everyElement(mesh)
+                                                             : binElements(mesh, frame, regionBoxes,
+                                                                           execution, {.dropsBetween = true});
         statistics.add(counted::elementsNear, mesh.elementCount());
         statistics.add(counted::elementBlockPairs, std::int64_t(bins.elements.size()));
         statistics.addMs(stage::bin, timer.restart());

@@ -121,6 +121,65 @@ TEST(ElementBins, HoldEveryElementWhoseBoxHasAPointOfTheRegion) {
     }
 }
 
+using NodePlaces = std::array<glm::i64vec3, 4>;
+
+// Sixfold volume; exact for nodes in 1024ths of a voxel, relative to a lattice point nearby.
+std::int64_t sixfold1024(const NodePlaces& p) {
+    const glm::i64vec3 a = p[1] - p[0], b = p[2] - p[0], c = p[3] - p[0];
+    return a.x * (b.y * c.z - b.z * c.y) + a.y * (b.z * c.x - b.x * c.z) + a.z * (b.x * c.y - b.y * c.x);
+}
+
+bool holdsPoint(const NodePlaces& nodes1024, const glm::i64vec3& point1024) {
+    const std::int64_t volume = sixfold1024(nodes1024);
+    for (std::size_t k = 0; k < 4; ++k) {
+        auto withPoint = nodes1024;
+        withPoint[k] = point1024;
+        if (sixfold1024(withPoint) * (volume < 0 ? -1 : 1) < 0) return false;
+    }
+    return true;
+}
+
+TEST(ElementBins, DropsMostElementsBetweenPointsAndNoneThatHoldsOne) {
+    std::mt19937 random(7);
+    // Near the origin, and where simple precision is a 4096th of a voxel.
+    for (const std::int64_t away : {0, 3000}) {
+        TetMesh mesh;
+        std::vector<NodePlaces> nodes1024;
+        for (int e = 0; e < 20000; ++e) {
+            const std::int64_t step =
+                std::array<std::int64_t, 4>{1, 16, 256, 512}[std::size_t(e % 4)];  // the coarse ones touch
+            std::uniform_int_distribution<std::int64_t> place(0, 2048 / step);
+            NodePlaces nodes;
+            std::array<std::int32_t, 4> tet;
+            for (std::size_t k = 0; k < 4; ++k) {
+                for (int a = 0; a < 3; ++a) nodes[k][a] = place(random) * step + (e % 3 == 0 ? 0 : 300);
+                tet[k] = std::int32_t(mesh.points.size());
+                mesh.points.push_back(Vec3d(nodes[k]) / 1024.0 + double(away));
+            }
+            if (sixfold1024(nodes) == 0) continue;
+            mesh.tets.push_back(tet);
+            nodes1024.push_back(nodes);
+        }
+        const int first = int(away);
+        const std::vector<IndexBox> regions{{Vec3i(first), Vec3i(first + 4)}};
+        const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel({0, 0, 0}, 1), {});
+        const ElementBins bins = binElements(mesh, frame, regions, {}, {.dropsBetween = true});
+        const ElementBins boxes = binElements(mesh, frame, regions, {});
+        std::int64_t between = 0;
+        for (std::int32_t e = 0; e < mesh.elementCount(); ++e) {
+            bool holds = false;
+            for (int p = 0; p < 27; ++p)
+                holds = holds || holdsPoint(nodes1024[std::size_t(e)],
+                                            glm::i64vec3(p % 3, p / 3 % 3, p / 9) * std::int64_t(1024));
+            const auto listed = bins.of(0);
+            EXPECT_TRUE(!holds || std::binary_search(listed.begin(), listed.end(), e)) << "element " << e;
+            between += holds ? 0 : 1;
+        }
+        const std::int64_t dropped = std::int64_t(boxes.elements.size() - bins.elements.size());
+        EXPECT_GT(dropped, away == 0 ? between * 2 / 3 : between / 4);
+    }
+}
+
 TEST(SoftwareResampler, DeliversEveryBoxOnceEvenEmptyOnes) {
     TetMesh mesh;
     mesh.points = {{0, 0, 0}, {8, 0, 0}, {0, 8, 0}, {0, 0, 8}};
