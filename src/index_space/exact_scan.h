@@ -14,16 +14,6 @@
 
 namespace tessera {
 
-/// One component of one field.
-struct ScanChannel {
-    const double* values;  ///< interleaved
-    int components;
-    int component;
-    bool cell;
-
-    double at(std::int32_t item) const { return values[std::int64_t(item) * components + component]; }
-};
-
 /// What is sampled.
 struct ScanInput {
     const TetMesh& mesh;

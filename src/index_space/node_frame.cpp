@@ -1,6 +1,8 @@
 #include "index_space/node_frame.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/large_pages.h"
 #include "base/parallel.h"
@@ -64,8 +66,12 @@ std::array<mpq_class, 3> exactIndexFromWorld(const Lattice& lattice, const Vec3d
     return indexFromWorld<mpq_class>(lattice, pointWorld);
 }
 
-NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution) {
+NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution,
+                     std::span<const ScanChannel> channels) {
     NodeFrame frame;
+    while (frame.valueCount < int(std::min(channels.size(), std::size(NodeFrame::Node{}.value))) &&
+           !channels[std::size_t(frame.valueCount)].cell)
+        ++frame.valueCount;
     frame.lattice = lattice;
     resizeLarge(frame.nodes, mesh.points.size());
     resizeLarge(frame.rough, mesh.points.size());
@@ -86,6 +92,8 @@ NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Executio
                     node.part[a] = double(index[a] - whole);
                 }
             }
+            for (int c = 0; c < frame.valueCount; ++c)
+                node.value[c] = channels[std::size_t(c)].at(std::int32_t(n));
             NodeFrame::Rough& rough = frame.rough[std::size_t(n)];
             for (int a = 0; a < 3; ++a) rough.index[a] = float(node.whole[a] + node.part[a]);
             rough.index[3] = 0;

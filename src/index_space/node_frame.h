@@ -3,6 +3,8 @@
 #include <gmpxx.h>
 
 #include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/large_pages.h"
@@ -11,6 +13,16 @@
 #include "tessera/mesh.h"
 
 namespace tessera {
+
+/// One component of one field.
+struct ScanChannel {
+    const double* values;  ///< interleaved
+    int components;
+    int component;
+    bool cell;
+
+    double at(std::int32_t item) const { return values[std::int64_t(item) * components + component]; }
+};
 
 /// 113 bits: what an element too thin for double is computed in.
 __extension__ typedef __float128 Quad;
@@ -23,17 +35,22 @@ __extension__ typedef __float128 Quad;
 struct NodeFrame {
     struct alignas(64) Node {  // a cache line each: elements reach for them in no order
         double whole[3];
-        double part[3];  ///< absolute error at most 4 * 2^-53
+        double part[3];   ///< absolute error at most 4 * 2^-53
+        double value[2];  ///< of the first channels, as many as `valueCount`
     };
     Lattice lattice;
     UninitializedVector<Node> nodes;
+    int valueCount = 0;
     struct alignas(16) Rough {
         float index[4];  ///< rounded index coordinates and 0
     };
     UninitializedVector<Rough> rough;  ///< for culling only
 };
 
-NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution);
+/// @param channels whose values at the nodes are wanted beside their places: kept are those of the first two,
+/// unless they are of cells.
+NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Execution& execution,
+                     std::span<const ScanChannel> channels = {});
 
 /// Index coordinates of a place, relative error about 2^-112 of the largest.
 std::array<Quad, 3> quadIndexFromWorld(const Lattice& lattice, const Vec3d& pointWorld);

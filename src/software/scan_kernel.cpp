@@ -220,8 +220,17 @@ void setUpLanes(const Walk& walk, const double* const (&nodes)[4][kBatch], std::
     const D d;
     Batch& batch = walk.scratch.batch;
     V v[4][3], part[4][3], base[3], low[3], high[3];
-    static_assert(offsetof(NodeFrame::Node, part) == 3 * sizeof(double));
+    static_assert(offsetof(NodeFrame::Node, part) == 3 * sizeof(double) &&
+                  offsetof(NodeFrame::Node, value) == 6 * sizeof(double));
+    const int values = walk.input.frame.valueCount;
+    BatchChannel* const channels = walk.scratch.channels.data();
     for (int k = 0; k < 4; ++k) {
+        V value0, value1;
+        if (values > 0) {
+            loadPairs(&nodes[k][lane], 6, value0, value1);
+            hn::Store(value0, d, &channels[0].node[k][lane]);
+        }
+        if (values > 1) hn::Store(value1, d, &channels[1].node[k][lane]);
         loadPairs(&nodes[k][lane], 0, v[k][0], v[k][1]);
         loadPairs(&nodes[k][lane], 2, v[k][2], part[k][0]);
         loadPairs(&nodes[k][lane], 4, part[k][1], part[k][2]);
@@ -397,9 +406,10 @@ void setUpChannelLanes(const Batch& batch, BatchChannel& channel, std::size_t la
     hn::Store(hn::DemoteTo(df, step), df, &channel.step[lane]);
 }
 
+// @param hasNodes the nodes' values came with their places.
 void loadChannel(const ScanInput& input, const ScanChannel& source, const std::int32_t* elements, int count,
-                 const Batch& batch, BatchChannel& channel) {
-    for (int lane = 0; lane < kBatch; ++lane) {
+                 const Batch& batch, bool hasNodes, BatchChannel& channel) {
+    for (int lane = 0; lane < kBatch && !hasNodes; ++lane) {
         const std::int32_t element = elements[lane < count ? lane : 0];
         const auto& tet = input.mesh.tets[std::size_t(element)];
         for (std::size_t k = 0; k < 4; ++k) channel.node[k][lane] = source.at(source.cell ? element : tet[k]);
@@ -806,15 +816,18 @@ void walkElement(Walk& walk, int lane) {
 // Elements reach for their nodes in no order: fetch those of the next batch while this one is worked, and the
 // elements after that.
 void prefetch(const ScanInput& input, std::span<const std::int32_t> elements, std::size_t begin) {
-    for (std::size_t i = begin; i < std::min(begin + kBatch, elements.size()); ++i) {
-        for (const std::int32_t node : input.mesh.tets[std::size_t(elements[i])]) {
+    const std::size_t end = std::min(begin + kBatch, elements.size());
+    for (std::size_t i = begin; i < end; ++i)
+        for (const std::int32_t node : input.mesh.tets[std::size_t(elements[i])])
             __builtin_prefetch(&input.frame.nodes[std::size_t(node)]);
-            for (const ScanChannel& channel : input.channels)
-                if (!channel.cell && channel.component == 0)
-                    __builtin_prefetch(channel.values + std::int64_t(node) * channel.components);
-        }
+    for (std::size_t c = std::size_t(input.frame.valueCount); c < input.channels.size(); ++c) {
+        const ScanChannel& channel = input.channels[c];
+        if (channel.cell || (channel.component != 0 && c != std::size_t(input.frame.valueCount))) continue;
+        for (std::size_t i = begin; i < end; ++i)
+            for (const std::int32_t node : input.mesh.tets[std::size_t(elements[i])])
+                __builtin_prefetch(channel.values + std::int64_t(node) * channel.components);
     }
-    for (std::size_t i = begin + kBatch; i < std::min(begin + 2 * kBatch, elements.size()); ++i)
+    for (std::size_t i = end; i < std::min(end + kBatch, elements.size()); ++i)
         __builtin_prefetch(&input.mesh.tets[std::size_t(elements[i])]);
 }
 
@@ -839,7 +852,8 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         scratch.floatBits = ~0u;
         for (std::size_t c = 0; c < input.channels.size(); ++c) {
             BatchChannel& channel = scratch.channels[c];
-            loadChannel(input, input.channels[c], batchElements, count, scratch.batch, channel);
+            loadChannel(input, input.channels[c], batchElements, count, scratch.batch,
+                        int(c) < input.frame.valueCount, channel);
             scratch.floatBits &= channel.floatBits;
         }
         std::copy_n(batchElements, count, scratch.element);

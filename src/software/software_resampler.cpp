@@ -144,7 +144,7 @@ class BoundSoftware : public BoundResampler {
         const TetMesh& mesh = part ? *part : bound_.whole();
         std::vector<ScanChannel> channels = channels_;
         if (part) channels = channelsOf(*part, everyField(*part));
-        const NodeFrame frame = frameNodes(mesh, lattice, execution);
+        const NodeFrame frame = frameNodes(mesh, lattice, execution, channels);
         const ScanInput input{mesh, frame, channels};
         // The elements near a single region are its own.
         const ElementBins bins = part && regions.size() == 1 ? everyElement(mesh)
