@@ -15,16 +15,6 @@ bool insideBounds(const DepthKey& key, const PlanFrame& frame) {
     return !intersect(kept, {first, first + frame.brickCells}).empty();
 }
 
-BrickRange bricksMeeting(const Box3d& index, int brickCells) {
-    // What lies beyond the range of indices is far outside the bounds; it must not overflow here.
-    constexpr double kFar = 1 << 30;
-    const double inverse = 1.0 / brickCells;
-    const Vec3d low = glm::clamp(index.min * inverse, Vec3d(-kFar), Vec3d(kFar));
-    const Vec3d high = glm::clamp((index.max + kBrickSlackVoxels) * inverse, Vec3d(-kFar), Vec3d(kFar));
-    return {{floorToInt(low.x), floorToInt(low.y), floorToInt(low.z)},
-            {floorToInt(high.x), floorToInt(high.y), floorToInt(high.z)}};
-}
-
 BrickRange clippedRange(const PlanFrame& frame, Depth depth) {
     const double inverse = 1.0 / frame.spacingWorld(depth);
     Box3d box{(frame.meshBoundsWorld.min - frame.originWorld) * inverse,

@@ -17,7 +17,15 @@ namespace tessera {
 bool insideBounds(const DepthKey& key, const PlanFrame& frame);
 
 /// Bricks of a size whose touch boxes may meet a box in index space.
-BrickRange bricksMeeting(const Box3d& index, int brickCells);
+inline BrickRange bricksMeeting(const Box3d& index, int brickCells) {
+    // What lies beyond the range of indices is far outside the bounds; it must not overflow here.
+    constexpr double kFar = 1 << 30;
+    const double inverse = 1.0 / brickCells;
+    const Vec3d low = glm::clamp(index.min * inverse, Vec3d(-kFar), Vec3d(kFar));
+    const Vec3d high = glm::clamp((index.max + kBrickSlackVoxels) * inverse, Vec3d(-kFar), Vec3d(kFar));
+    return {{floorToInt(low.x), floorToInt(low.y), floorToInt(low.z)},
+            {floorToInt(high.x), floorToInt(high.y), floorToInt(high.z)}};
+}
 
 /// Bricks of a depth that may meet the mesh and the frame's bounds.
 BrickRange clippedRange(const PlanFrame& frame, Depth depth);
