@@ -47,6 +47,8 @@ inline constexpr double kMostFloatSteps = 0x1p22;
 /// From one voxel to the next a value changes by no more than the range of the element's nodes; beyond this a
 /// step may overflow.
 inline constexpr double kWidestFloatRange = 0x1p127;
+/// The least number that isn't finite in float.
+inline constexpr double kRoundsToInfinity = 0x1.ffffffp127;
 /// Larger elements would overflow the offsets, which are computed in double.
 inline constexpr double kLargestElement = 0x1p28;
 /// A scanline's first or last voxel may lie this far outside the element, in voxels.
@@ -377,7 +379,7 @@ void setUpChannelLanes(const Batch& batch, BatchChannel& channel, std::size_t la
     for (int k = 0; k < 4; ++k) {
         f[k] = hn::Load(d, &channel.node[k][lane]);
         const V rounded = hn::PromoteTo(d, hn::DemoteTo(df, f[k]));
-        isFinite = hn::And(isFinite, hn::Le(hn::Abs(rounded), hn::Set(d, kMost)));
+        isFinite = hn::And(isFinite, hn::Lt(hn::Abs(f[k]), hn::Set(d, kRoundsToInfinity)));
         low = hn::IfThenElse(hn::Lt(rounded, low), rounded, low);
         high = hn::IfThenElse(hn::Gt(rounded, high), rounded, high);
     }
