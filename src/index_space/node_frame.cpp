@@ -6,21 +6,11 @@
 
 #include "base/large_pages.h"
 #include "base/parallel.h"
+#include "index_space/node_kernel.h"
 
 namespace tessera {
 
 namespace {
-
-// x = o + (whole + part) h along one axis. The difference x - o is split without error into t + tail, and the
-// fused multiply-add (a correctly rounded operation, so the same on every processor) gives the remainder
-// after whole spacings.
-void splitAxis(double x, double o, double h, double& whole, double& part) {
-    const double t = x - o;
-    const double back = t - x;
-    const double tail = (x - (t - back)) - (o + back);
-    whole = std::floor(t / h);
-    part = (std::fma(-whole, h, t) + tail) / h;
-}
 
 template <class Real>
 std::array<Real, 3> cross(const std::array<Real, 3>& a, const std::array<Real, 3>& b) {
@@ -56,6 +46,18 @@ Quad floorOf(Quad x) {
     return whole > x ? whole - 1 : whole;
 }
 
+// The same of a lattice that isn't parallel to the axes.
+void splitTurned(std::span<const Vec3d> placesWorld, const Lattice& lattice, SplitPlaces& split) {
+    for (std::size_t i = 0; i < placesWorld.size(); ++i) {
+        const std::array<Quad, 3> index = quadIndexFromWorld(lattice, placesWorld[i]);
+        for (std::size_t a = 0; a < 3; ++a) {
+            const Quad whole = floorOf(index[a]);
+            split.whole[3 * i + a] = double(whole);
+            split.part[3 * i + a] = double(index[a] - whole);
+        }
+    }
+}
+
 }  // namespace
 
 std::array<Quad, 3> quadIndexFromWorld(const Lattice& lattice, const Vec3d& pointWorld) {
@@ -75,28 +77,30 @@ NodeFrame frameNodes(const TetMesh& mesh, const Lattice& lattice, const Executio
     frame.lattice = lattice;
     resizeLarge(frame.nodes, mesh.points.size());
     resizeLarge(frame.rough, mesh.points.size());
-    const bool axisParallel = lattice.isAxisParallel();
-    const double spacing[3] = {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z};
+    const Vec3d spacingWorld{lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z};
+    const std::span<const Vec3d> points(mesh.points);
     parallelForChunks(execution, mesh.nodeCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
-        for (std::int64_t n = begin; n < end; ++n) {
-            const Vec3d& x = mesh.points[std::size_t(n)];
-            NodeFrame::Node& node = frame.nodes[std::size_t(n)];
-            if (axisParallel) {
-                for (int a = 0; a < 3; ++a)
-                    splitAxis(x[a], lattice.originWorld[a], spacing[a], node.whole[a], node.part[a]);
-            } else {
-                const std::array<Quad, 3> index = quadIndexFromWorld(lattice, x);
+        SplitPlaces split;
+        for (std::int64_t first = begin; first < end; first += kNodeBatch) {
+            const auto batch = points.subspan(std::size_t(first),
+                                              std::size_t(std::min<std::int64_t>(kNodeBatch, end - first)));
+            if (lattice.isAxisParallel())
+                splitPlaces(batch, lattice.originWorld, spacingWorld, split);
+            else
+                splitTurned(batch, lattice, split);
+            for (std::size_t i = 0; i < batch.size(); ++i) {
+                const std::size_t n = std::size_t(first) + i;
+                NodeFrame::Node& node = frame.nodes[n];
+                NodeFrame::Rough& rough = frame.rough[n];
                 for (std::size_t a = 0; a < 3; ++a) {
-                    const Quad whole = floorOf(index[a]);
-                    node.whole[a] = double(whole);
-                    node.part[a] = double(index[a] - whole);
+                    node.whole[a] = split.whole[3 * i + a];
+                    node.part[a] = split.part[3 * i + a];
+                    rough.index[a] = float(node.whole[a] + node.part[a]);
                 }
+                rough.index[3] = 0;
+                for (int c = 0; c < frame.valueCount; ++c)
+                    node.value[c] = channels[std::size_t(c)].at(std::int32_t(n));
             }
-            for (int c = 0; c < frame.valueCount; ++c)
-                node.value[c] = channels[std::size_t(c)].at(std::int32_t(n));
-            NodeFrame::Rough& rough = frame.rough[std::size_t(n)];
-            for (int a = 0; a < 3; ++a) rough.index[a] = float(node.whole[a] + node.part[a]);
-            rough.index[3] = 0;
         }
     });
     return frame;

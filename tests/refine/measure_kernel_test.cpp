@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "brick/seams.h"
+#include "every_target.h"
 #include "mesh/geometry.h"
 #include "refine/error_samples.h"
-#include "refine/every_target.h"
 #include "refine/sample_errors.h"
 
 namespace tessera {

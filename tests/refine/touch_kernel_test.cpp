@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "refine/every_target.h"
+#include "every_target.h"
 
 namespace tessera {
 namespace {

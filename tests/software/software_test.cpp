@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <random>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "every_target.h"
 #include "index_space/element_bins.h"
 #include "index_space/element_depth.h"
 #include "index_space/node_frame.h"
@@ -37,10 +39,15 @@ TEST(NodeFrame, KeepsPlacesToAFewBitsOfOneVoxelHoweverFarFromTheOrigin) {
             mesh.points.push_back(
                 {offset + uniform(random), offset + 1e-3 * uniform(random), 1e5 * uniform(random)});
         for (const double spacing : {1.0, 0.1, 1.0 / 3, 1e-3, 12345.678}) {
-            const NodeFrame frame =
-                frameNodes(mesh, Lattice::axisParallel({offset + 0.1, offset - 0.7, 0.3}, spacing), {});
+            const Lattice lattice = Lattice::axisParallel({offset + 0.1, offset - 0.7, 0.3}, spacing);
+            const NodeFrame frame = frameNodes(mesh, lattice, {});
             for (std::size_t n = 0; n < mesh.points.size(); ++n)
                 for (std::size_t a = 0; a < 3; ++a) EXPECT_LE(exactError(frame, mesh, n, a), 4 * 0x1p-53);
+            onEveryTarget([&] {
+                const NodeFrame same = frameNodes(mesh, lattice, {});
+                for (std::size_t n = 0; n < mesh.points.size(); ++n)
+                    EXPECT_EQ(std::memcmp(&same.nodes[n], &frame.nodes[n], 6 * sizeof(double)), 0);
+            });
         }
     }
 }
@@ -177,6 +184,10 @@ TEST(ElementBins, DropsMostElementsBetweenPointsAndNoneThatHoldsOne) {
         }
         const std::int64_t dropped = std::int64_t(boxes.elements.size() - bins.elements.size());
         EXPECT_GT(dropped, away == 0 ? between * 2 / 3 : between / 4);
+        onEveryTarget([&] {
+            const ElementBins same = binElements(mesh, frame, regions, {}, {.dropsBetween = true});
+            EXPECT_TRUE(std::ranges::equal(same.of(0), bins.of(0)));
+        });
     }
 }
 
