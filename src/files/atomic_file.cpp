@@ -256,16 +256,21 @@ AtomicFileBuffer::AtomicFileBuffer(AtomicFile& file, const Execution& execution,
     setp(pieces_[0]->bytes.data(), pieces_[0]->bytes.data() + kBufferBytes);
 }
 
+std::launch AtomicFileBuffer::policyOf(const Execution& execution) {
+    if (execution.threadCount() == 1) return std::launch::deferred;
+    return std::launch::async | std::launch::deferred;
+}
+
 void AtomicFileBuffer::handOver() {
     execution_->throwIfCancelled();
     if (writing_.valid()) writing_.get();
     const std::span<const char> piece(pbase(), pptr());
     if (piece.empty()) return;
-    const auto policy = execution_->threadCount() > 1 ? std::launch::async : std::launch::deferred;
-    writing_ = std::async(policy, [this, piece, offset = bufferStart_] {
+    const auto write = [this, piece, offset = bufferStart_] {
         if (watch_) watch_(piece);
         file_->writeAt(offset, piece.data(), piece.size());
-    });
+    };
+    writing_ = std::async(policyOf(*execution_), write);
     bufferStart_ += std::int64_t(piece.size());
     std::swap(pieces_[0], pieces_[1]);
     setp(pieces_[0]->bytes.data(), pieces_[0]->bytes.data() + kBufferBytes);

@@ -71,9 +71,9 @@ class AtomicFile {
 };
 
 /// Output side of a std::ostream over an AtomicFile. Bytes are written by a thread of their own while the
-/// next ones are gathered, unless `execution` has one thread. Throws IoError from a write after the one that
-/// failed (set the stream's exceptions to badbit so that it passes through) and Cancelled when the caller
-/// asks to stop.
+/// next ones are gathered, where there is a thread to be had (`policyOf`). Throws IoError from a write after
+/// the one that failed (set the stream's exceptions to badbit so that it passes through) and Cancelled when
+/// the caller asks to stop.
 class AtomicFileBuffer : public std::streambuf {
   public:
     using Watch = std::function<void(std::span<const char>)>;
@@ -82,6 +82,9 @@ class AtomicFileBuffer : public std::streambuf {
     ~AtomicFileBuffer() override;
     /// Waits until all is written.
     void flushAll();
+    /// How std::async runs what writes: by a thread of its own, unless there is none to be had. What it runs
+    /// is given as an lvalue: where no thread starts, the library takes it a second time.
+    static std::launch policyOf(const Execution& execution);
 
   protected:
     int_type overflow(int_type c) override;

@@ -548,7 +548,7 @@ class GridStream {
     GridStream(AtomicFile& file, const std::map<std::string, std::string>& entries, std::size_t gridCount,
                const Execution& execution)
         : file_(file),
-          policy_(execution.threadCount() > 1 ? std::launch::async : std::launch::deferred),
+          policy_(AtomicFileBuffer::policyOf(execution)),
           buffer_(file, execution,
                   [this](std::span<const char> bytes) { digest_.update(bytes.data(), bytes.size()); }),
           stream_(&buffer_) {
@@ -562,7 +562,8 @@ class GridStream {
     // Returns at once; the grid stays as it is until `finish`.
     void write(const openvdb::GridBase::Ptr& grid) {
         await();
-        writing_ = std::async(policy_, [this, grid] { archive_.writeGrid(stream_, *grid); });
+        const auto writeGrid = [this, grid] { archive_.writeGrid(stream_, *grid); };
+        writing_ = std::async(policy_, writeGrid);
     }
 
     // The file's UUID is the digest of all other bytes: equal content gives equal files, and a reader can

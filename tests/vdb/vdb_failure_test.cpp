@@ -1,3 +1,5 @@
+#include <pthread.h>
+
 #include <atomic>
 #include <ostream>
 #include <span>
@@ -99,6 +101,25 @@ TEST_F(VdbFailureTest, StreamsWriteInOrderAndGoBack) {
         out.commit();
         EXPECT_TRUE(readBytes(file("out")) == changed);
     }
+}
+
+TEST_F(VdbFailureTest, StreamsNeedNoThreadOfTheirOwn) {
+    pthread_attr_t before, huge;
+    ASSERT_EQ(pthread_getattr_default_np(&before), 0);
+    ASSERT_EQ(pthread_getattr_default_np(&huge), 0);
+    ASSERT_EQ(pthread_attr_setstacksize(&huge, std::size_t(1) << 50), 0);
+    Execution execution;
+    execution.threads = 2;
+    const std::string expected(std::size_t(5) << 20, 'x');
+    AtomicFile out(file("out"));
+    AtomicFileBuffer buffer(out, execution);
+    std::ostream stream(&buffer);
+    ASSERT_EQ(pthread_setattr_default_np(&huge), 0);  // no stack, no thread
+    stream << expected << std::flush;
+    ASSERT_EQ(pthread_setattr_default_np(&before), 0);
+    ASSERT_TRUE(stream.good());
+    out.commit();
+    EXPECT_TRUE(readBytes(file("out")) == expected);
 }
 
 TEST_F(VdbFailureTest, SymbolicLinkKeepsPointingAtTheFile) {
