@@ -149,7 +149,11 @@ bool readFields(const Element* section, FieldLocation location, std::vector<VtuA
             plainName(array.name) != array.name || !names.insert(array.name).second)
             return false;
     }
-    return true;
+    // VTK warns of vectors that aren't any.
+    const std::string vectors = section->attribute("Vectors");
+    return vectors.empty() || std::any_of(fields.begin(), fields.end(), [&](const VtuArray& array) {
+               return array.location == location && array.name == vectors && array.components == 3;
+           });
 }
 
 bool readPiece(const Element& piece, VtuMarkup& markup) {
@@ -181,8 +185,10 @@ bool readPiece(const Element& piece, VtuMarkup& markup) {
 
 bool readRoot(const Element& root, VtuMarkup& markup) {
     const std::string header = root.attribute("header_type"), compressor = root.attribute("compressor");
+    const std::string version = root.attribute("version");  // VTK warns of one that it doesn't know
     if (root.name != "VTKFile" ||
         !root.hasOnly({"type", "version", "byte_order", "header_type", "compressor"}, {}) ||
+        !(version == "0.1" || version == "1.0" || version == "2.0" || version == "2.1" || version == "2.2") ||
         root.attribute("type") != "UnstructuredGrid" || root.attribute("byte_order") != "LittleEndian" ||
         !(header.empty() || header == "UInt32" || header == "UInt64") ||
         !(compressor.empty() || compressor == "vtkZLibDataCompressor"))

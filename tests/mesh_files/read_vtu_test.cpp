@@ -215,6 +215,20 @@ TEST_F(ReadPlainVtu, LeavesOtherFormsToVtk) {
                 false);
 }
 
+TEST_F(ReadPlainVtu, LeavesToVtkWhatItWarnsOf) {
+    RawVtu file = manyTets();
+    file.version = "9.9";
+    const std::string newer = file.text<double, std::int64_t>();
+    file.version = "1.0";
+    std::string noVectors = file.text<double, std::int64_t>();
+    noVectors.replace(noVectors.find("Scalars"), 7, "Vectors");
+    for (const std::string& text : {newer, noVectors}) {
+        const std::string path = folder_.write("mesh.vtu", text);
+        EXPECT_FALSE(readPlainVtu(path, {}, {}));
+        EXPECT_EQ(readMesh(path, {}, {}).statistics.warnings.size(), 1u);
+    }
+}
+
 TEST_F(ReadPlainVtu, LeavesDamageToVtk) {
     const auto expectRefused = [&](const std::string& text, const std::string& word) {
         const std::string path = folder_.write("damaged.vtu", text);
