@@ -31,7 +31,7 @@ struct Element {
         const auto found = attributes.find(called);
         return found == attributes.end() ? std::string() : found->second;
     }
-    /// Whether it has no others, and no child twice unless these are arrays.
+    /// Whether it has no others, and no child twice unless there may be several.
     bool hasOnly(std::initializer_list<std::string_view> attributeNames,
                  std::initializer_list<std::string_view> childNames) const {
         const auto isIn = [](const auto& list, const std::string& word) {
@@ -41,7 +41,9 @@ struct Element {
         return std::all_of(attributes.begin(), attributes.end(),
                            [&](const auto& a) { return isIn(attributeNames, a.first); }) &&
                std::all_of(children.begin(), children.end(), [&](const Element& c) {
-                   return isIn(childNames, c.name) && (c.name == "DataArray" || seen.insert(c.name).second);
+                   const bool mayBeSeveral =
+                       c.name == "DataArray" || c.name == "InformationKey" || c.name == "Value";
+                   return isIn(childNames, c.name) && (mayBeSeveral || seen.insert(c.name).second);
                });
     }
 };
@@ -90,10 +92,14 @@ class Parser {
             rest_.remove_prefix(end + 1);
         }
     }
-    /// An element with all that is in it.
+    /// An element with all that is in it: text only in a Value, and there only a number.
     bool element(Element& element, int depth = 0) {
         bool isEmpty = false;
-        if (depth > 4 || !openTag(element, isEmpty)) return false;
+        if (depth > 5 || !openTag(element, isEmpty)) return false;
+        if (element.name == "Value" && !isEmpty) {
+            skipSpaces();
+            rest_.remove_prefix(std::min(rest_.find_first_not_of("0123456789+-.eE"), rest_.size()));
+        }
         while (!isEmpty) {
             skipSpaces();
             if (take("</" + element.name + ">")) break;
@@ -124,9 +130,21 @@ std::optional<std::int64_t> numberIn(const std::string& text, std::int64_t least
     return number >= least && number <= most ? std::optional(number) : std::nullopt;
 }
 
+/// What VTK notes of an array's values, and nobody reads here.
+bool isRangeKey(const Element& element) {
+    const std::string name = element.attribute("name");
+    return element.name == "InformationKey" && element.hasOnly({"name", "location", "length"}, {"Value"}) &&
+           (name == "L2_NORM_RANGE" || name == "L2_NORM_FINITE_RANGE") &&
+           element.attribute("location") == "vtkDataArray" && element.attribute("length") == "2" &&
+           element.children.size() == 2 && element.children[0].hasOnly({"index"}, {}) &&
+           element.children[1].hasOnly({"index"}, {}) && element.children[0].attribute("index") == "0" &&
+           element.children[1].attribute("index") == "1";
+}
+
 bool readArray(const Element& element, FieldLocation location, VtuArray& array) {
     if (!element.hasOnly({"type", "Name", "NumberOfComponents", "format", "offset", "RangeMin", "RangeMax"},
-                         {}) ||
+                         {"InformationKey"}) ||
+        !std::all_of(element.children.begin(), element.children.end(), isRangeKey) ||
         element.attribute("format") != "appended")
         return false;
     const std::string componentText = element.attribute("NumberOfComponents");

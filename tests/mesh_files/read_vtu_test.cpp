@@ -33,6 +33,7 @@ struct RawVtu {
     bool isPacked = true, hasWideHeaders = true;
     std::size_t blockBytes = 4096;
     std::string version = "1.0", comment;
+    std::string key;  // in every array, empty or a whole element
 
     std::vector<Vec3d> points;
     std::vector<std::int64_t> nodes, offsets;
@@ -45,7 +46,8 @@ struct RawVtu {
         const auto add = [&](const char* type, const char* name, int components, const std::string& bytes) {
             markup += std::string("<DataArray type=\"") + type + "\" Name=\"" + name +
                       "\" NumberOfComponents=\"" + std::to_string(components) +
-                      "\" format=\"appended\" offset=\"" + std::to_string(appended.size()) + "\"/>\n";
+                      "\" format=\"appended\" offset=\"" + std::to_string(appended.size()) + "\">\n" + key +
+                      "</DataArray>\n";
             appended += packed(bytes);
         };
         const auto open = [&](const std::string& tag) { markup += "<" + tag + ">\n"; };
@@ -185,6 +187,10 @@ TEST_F(ReadPlainVtu, GivesWhatVtkReads) {
             expectReads(file.text<double, std::int64_t>(), expected, true);
             expectReads(file.text<float, std::int32_t>(), expected, true);
         }
+    file.key =
+        "<InformationKey name=\"L2_NORM_RANGE\" location=\"vtkDataArray\" length=\"2\">\n"
+        "  <Value index=\"0\">\n    0\n  </Value>\n  <Value index=\"1\">\n    1.7e-3\n  </Value>\n"
+        "</InformationKey>\n";
     file.blockBytes = 20000;  // some arrays fill none
     file.isPacked = true;
     expectReads(file.text<double, std::int32_t>(), expected, true);
@@ -203,6 +209,9 @@ TEST_F(ReadPlainVtu, ReadsTheFieldsAskedFor) {
 TEST_F(ReadPlainVtu, LeavesOtherFormsToVtk) {
     RawVtu file = manyTets();
     const MeshFile expected = readMesh(folder_.write("text.vtu", asText(file)), {}, {});
+    file.key = "<InformationKey name=\"GUI_HIDE\" location=\"vtkAbstractArray\"/>\n";
+    EXPECT_FALSE(readPlainVtu(folder_.write("key.vtu", file.text<double, std::int64_t>()), {}, {}));
+    file.key = "";
     file.comment = "<!-- a comment -->\n";
     expectReads(file.text<double, std::int64_t>(), expected, false);
     file.comment = "";
