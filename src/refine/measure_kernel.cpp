@@ -135,8 +135,10 @@ LaneBits findLeaves(MeasureBatch& batch, const BrickTree::Walk& walk, double inv
             const V place = load(batch.place[a], i), index0 = hn::Mul(place, set(inverseSpacing0));
             isInside = hn::And(isInside, hn::And(hn::Ge(place, set(bounds.min[int(a)])),
                                                  hn::Le(place, set(bounds.max[int(a)]))));
-            isInside = hn::And(isInside, hn::Lt(hn::Abs(index0), limit));
-            point[a] = hn::DemoteTo(ints, hn::Floor(index0));
+            // What is no number, or too large, has no integer either.
+            const auto isNear = hn::Lt(hn::Abs(index0), limit);
+            isInside = hn::And(isInside, isNear);
+            point[a] = hn::DemoteTo(ints, hn::Floor(hn::IfThenElseZero(isNear, index0)));
             const I size = hn::Set(ints, walk.rootSize[int(a)]);
             const I ofRoot = hn::Sub(hn::ShiftRightSame(point[a], std::min(walk.rootShift, 31)),
                                      hn::Set(ints, walk.rootMin[int(a)]));
