@@ -313,12 +313,15 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
     }
 }
 
+// Not further away than lattice indices are, so that indices relative to it are whole numbers in double.
 void firstVoxel(const ScanInput& input, std::int32_t element, double (&base)[3]) {
+    constexpr double kFarthest = 0x1p32;
     const auto& tet = input.mesh.tets[std::size_t(element)];
     for (int a = 0; a < 3; ++a) {
         base[a] = input.frame.nodes[std::size_t(tet[0])].whole[a];
         for (std::size_t k = 1; k < 4; ++k)
             base[a] = std::min(base[a], input.frame.nodes[std::size_t(tet[k])].whole[a]);
+        base[a] = std::clamp(base[a], -kFarthest, kFarthest);
     }
 }
 

@@ -296,6 +296,19 @@ TEST(SoftwareResampler, EveryTargetAndCutIntoRegionsGivesTheSameBits) {
     }
 }
 
+TEST(SoftwareResampler, ElementsThatReachFarBeyondTheLatticeCoverAllOfIt) {
+    for (const double reach : {1e10, 1e17, 1e30, 1e100}) {
+        TetMesh mesh;
+        mesh.points = {{-reach, -reach, -reach},
+                       {4 * reach, -reach, -reach},
+                       {-reach, 4 * reach, -reach},
+                       {-reach, -reach, 4 * reach}};
+        mesh.tets = {{0, 1, 2, 3}};
+        const Sampled result = sampled(mesh, {}, {}, {{-3, 1, 3}, {18, 9, 9}}, 1);
+        EXPECT_EQ(std::count(result.coverage.begin(), result.coverage.end(), 1), 21 * 8 * 6) << reach;
+    }
+}
+
 TEST(SoftwareResampler, ElementsWithoutAPlaceCoverNothing) {
     for (const double nowhere : {double(NAN), double(INFINITY)}) {
         TetMesh mesh;
