@@ -9,6 +9,17 @@
 
 namespace tessera::test {
 
+/// The bytes of numbers, as this machine has them.
+template <class Stored, class Values>
+std::string bytesOf(const Values& values) {
+    std::string bytes;
+    for (const auto value : values) {
+        const auto stored = Stored(value);
+        bytes.append(reinterpret_cast<const char*>(&stored), sizeof stored);
+    }
+    return bytes;
+}
+
 /// An ASCII .vtu file in the making.
 struct VtuText {
     struct Cell {

@@ -80,7 +80,7 @@ class BrickStore {
     /// Takes the coverage away where `keeps(local)` is false, local index in [0, B)^3.
     template <class Keeps>
     void crop(std::size_t leaf, const Keeps& keeps);
-    /// Frees one tile; writers call it as soon as the tile is in the file's tree.
+    /// Frees one tile; writers call it as soon as the file doesn't need it any more.
     void release(std::size_t leaf, int tile) {
         tiles_[leaf * std::size_t(tileCount_) + std::size_t(tile)].reset();
     }

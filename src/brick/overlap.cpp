@@ -31,7 +31,7 @@ bool areApartOn(const Vec3d& axis, const std::array<Vec3d, 4>& corners, const Ve
     }
     const double radius = glm::dot(glm::abs(axis), half);
     const double scale = std::max({largest, radius, sumOf(axis) * reach});
-    const double tolerance = 1e-12 * scale;
+    const double tolerance = kShadowTolerance * scale;
     return low > radius + tolerance || high < -radius - tolerance;
 }
 

@@ -10,6 +10,10 @@ namespace tessera {
 /// than any resampler spills (2^-8), so the owner of every covered lattice point exists.
 inline constexpr double kBrickSlackVoxels = 1.0 / 128;
 
+/// Shadows on an axis that lie apart by less than this, of what they are computed from, count as touching:
+/// more than all rounding.
+inline constexpr double kShadowTolerance = 1e-12;
+
 /// A closed element and half-open boxes [min, max) in one space.
 class ElementOverlap {
   public:

@@ -76,7 +76,7 @@ class BatchSampler {
     std::vector<float> zeros_;          // what is read where there are no corners: a tile of every channel
     const Field* nearField_ = nullptr;  // the first one at nodes, whose first component is at hand:
     int nearChannel_ = -1;
-    UninitializedVector<Quad> nodes_;  // place and that component, fetched together
+    UninitializedVector<FourDoubles> nodes_;  // place and that component, fetched together
 };
 
 }  // namespace tessera

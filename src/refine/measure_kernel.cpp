@@ -59,11 +59,11 @@ HWY_INLINE void add(V v, LaneSums& sums, std::size_t i) {
     hn::Store(hn::Add(hn::Load(D(), lanes), v), D(), lanes);
 }
 
-HWY_INLINE void load(const Quad* quads, std::size_t i, V (&v)[4]) {
+HWY_INLINE void load(const FourDoubles* quads, std::size_t i, V (&v)[4]) {
     hn::LoadInterleaved4(D(), quads[i].number.data(), v[0], v[1], v[2], v[3]);
 }
 
-void gatherNodes(MeasureBatch& batch, const Quad* nodes) {
+void gatherNodes(MeasureBatch& batch, const FourDoubles* nodes) {
     for (std::size_t i = 0; i < std::size_t(batch.count); ++i)
         for (std::size_t k = 0; k < 4; ++k) batch.node[k][i] = nodes[batch.tet[i][k]];
 }
@@ -324,7 +324,7 @@ HWY_EXPORT(addNodeSquares);
 HWY_EXPORT(addIntegral);
 HWY_EXPORT(addValues);
 
-void gatherNodes(MeasureBatch& batch, const Quad* nodes) {
+void gatherNodes(MeasureBatch& batch, const FourDoubles* nodes) {
     HWY_DYNAMIC_DISPATCH(gatherNodes)(batch, nodes);
 }
 void placeNodes(MeasureBatch& batch, const Vec3d& originWorld, LaneDoubles& values) {

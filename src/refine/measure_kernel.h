@@ -27,7 +27,7 @@ using LaneInts = Lanes<std::int32_t>;
 using LaneBits = std::uint64_t;
 
 /// Four numbers that are fetched at once, half a cache line.
-struct alignas(32) Quad {
+struct alignas(32) FourDoubles {
     std::array<double, 4> number;
 };
 
@@ -56,13 +56,14 @@ struct SquareSums {
 /// volume.
 struct alignas(64) MeasureBatch {
     std::array<std::int32_t, 4> tet[kMeasureLanes];  ///< of elements: their nodes
-    Quad node[4][kMeasureLanes];                     ///< theirs, or a node as the first: place and a value
+    FourDoubles node[4][kMeasureLanes];              ///< theirs, or a node as the first: place and a value
     LaneDoubles sixfold;                             ///< of elements: six times the volume, with its sign
     LaneDoubles volume;    ///< |volume|, world units; 0 for a lane that is no sample
     LaneDoubles place[3];  ///< from the tree's origin, world units
     LaneInts leaf;
-    Quad frame[kMeasureLanes];  ///< of the leaf: first point, in points of its level, and points a world unit
-    LaneDoubles fraction[3];    ///< in the cell
+    FourDoubles
+        frame[kMeasureLanes];  ///< of the leaf: first point, in points of its level, and points a world unit
+    LaneDoubles fraction[3];   ///< in the cell
     /// Of the cell: the tile and the offset there of the first corner, 1, 2 and 4 where the corners beyond it
     /// along x, y and z lie in other tiles, and its least index on any axis.
     LaneInts tile, offset, beyond, leastCell;
@@ -83,7 +84,7 @@ struct ElementSigns {
 namespace measure {
 
 /// Fetches the elements' nodes, and those of the lanes from count on.
-void gatherNodes(MeasureBatch& batch, const Quad* nodes);
+void gatherNodes(MeasureBatch& batch, const FourDoubles* nodes);
 /// Places from the tree's origin of samples that are nodes, and the nodes' values.
 void placeNodes(MeasureBatch& batch, const Vec3d& originWorld, LaneDoubles& values);
 /// Volumes, centroids from the tree's origin, and the means of the nodes' values. @param reference a place

@@ -1,6 +1,7 @@
 #include "refine/touch_kernel.h"
 
 #include "base/vector_targets.h"
+#include "brick/overlap.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "refine/touch_kernel.cpp"
@@ -42,7 +43,7 @@ HWY_INLINE M areApartOn(const Pair& pair, const V (&axis)[Count], const std::siz
         size = hn::Add(size, hn::Abs(axis[a]));
     }
     const V scale = hn::Max(hn::Mul(size, pair.reach), hn::Max(radius, largest));
-    const V tolerance = hn::Mul(hn::Set(D(), 1e-12), scale);
+    const V tolerance = hn::Mul(hn::Set(D(), kShadowTolerance), scale);
     return hn::Or(hn::Gt(low, hn::Add(radius, tolerance)), hn::Lt(high, hn::Sub(hn::Neg(radius), tolerance)));
 }
 

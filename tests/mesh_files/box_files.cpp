@@ -9,23 +9,14 @@
 #include <span>
 #include <stdexcept>
 
+#include "vtu_text.h"
+
 namespace tessera::test {
 
 namespace {
 
 void writeFile(const std::string& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
-}
-
-/// The bytes of numbers, as this machine has them.
-template <typename Stored, typename Values>
-std::string bytesOf(const Values& values) {
-    std::string bytes;
-    for (const auto value : values) {
-        const auto stored = Stored(value);
-        bytes.append(reinterpret_cast<const char*>(&stored), sizeof stored);
-    }
-    return bytes;
 }
 
 }  // namespace

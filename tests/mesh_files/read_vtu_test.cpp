@@ -15,18 +15,9 @@
 namespace tessera {
 namespace {
 
+using test::bytesOf;
 using test::TemporaryFolder;
 using test::VtuText;
-
-template <class Stored, class Values>
-std::string bytesOf(const Values& values) {
-    std::string bytes;
-    for (const auto value : values) {
-        const auto stored = Stored(value);
-        bytes.append(reinterpret_cast<const char*>(&stored), sizeof stored);
-    }
-    return bytes;
-}
 
 /// A file in the making whose arrays are appended as raw bytes.
 struct RawVtu {

@@ -51,7 +51,7 @@ TEST_P(MeasureKernel, PlacesElements) {
         for (std::size_t k = 0; k < 4; ++k)
             for (int a = 0; a < 3; ++a) batch_->node[k][i].number[std::size_t(a)] = nodes[i][k][a];
     for (auto& node : batch_->node)
-        for (Quad& quad : node) quad.number[3] = any(-5, 5);
+        for (FourDoubles& quad : node) quad.number[3] = any(-5, 5);
     LaneDoubles means;
     onEveryTarget([&] {
         const ElementSigns signs = measure::placeElements(*batch_, samples.reference(), origin, means);
@@ -76,15 +76,15 @@ TEST_P(MeasureKernel, PlacesElements) {
 
 TEST_P(MeasureKernel, GathersAndPlacesNodes) {
     constexpr std::size_t kNodes = 200;
-    std::vector<Quad> nodes(kNodes);
-    for (Quad& node : nodes)
+    std::vector<FourDoubles> nodes(kNodes);
+    for (FourDoubles& node : nodes)
         for (double& number : node.number) number = any(-5, 5);
     for (auto& tet : batch_->tet)
         for (std::int32_t& node : tet) node = std::int32_t(any(0, kNodes));
     const Vec3d origin{-1.1, 0.7, 3.3};
     LaneDoubles values;
     onEveryTarget([&] {
-        for (auto& node : batch_->node) std::fill(std::begin(node), std::end(node), Quad{});
+        for (auto& node : batch_->node) std::fill(std::begin(node), std::end(node), FourDoubles{});
         measure::gatherNodes(*batch_, nodes.data());
         measure::placeNodes(*batch_, origin, values);
         for (std::size_t i = 0; i < count(); ++i) {
