@@ -9,6 +9,7 @@ namespace tessera {
 
 namespace {
 
+constexpr std::size_t kStreamedBytes = std::size_t(16) << 20;
 constexpr std::uint64_t kRowCovered = 0x0101010101010101ull;  // eight coverage bytes, all 1
 
 // Coverage of a tile as seen in a block: rows of eight bytes along x.
@@ -44,31 +45,52 @@ Four load(const float* from) {
     std::memcpy(&four, from, sizeof four);
     return four;
 }
+template <bool kStreams>
 void store(const Four& four, float* to) {
+#ifdef __SSE__
+    if constexpr (kStreams) return __builtin_ia32_movntps(to, four);
+#endif
     std::memcpy(to, &four, sizeof four);
 }
+// Other threads see what was streamed only after this.
+void finishStreaming() {
+#ifdef __SSE__
+    __builtin_ia32_sfence();
+#endif
+}
 
-// to[x * toStride + z] = from[z * fromStride + x] for x and z below 4.
-void transpose(const float* from, std::size_t fromStride, float* to, std::size_t toStride) {
-    const Four a = load(from), b = load(from + fromStride), c = load(from + 2 * fromStride),
-               d = load(from + 3 * fromStride);
+struct FourByFour {
+    Four row[4];
+};
+// Row x holds the x-th numbers of four rows.
+FourByFour loadTransposed(const float* from, std::size_t stride) {
+    const Four a = load(from), b = load(from + stride), c = load(from + 2 * stride),
+               d = load(from + 3 * stride);
     const Four low02 = __builtin_shufflevector(a, c, 0, 4, 1, 5),
                low13 = __builtin_shufflevector(b, d, 0, 4, 1, 5),
                high02 = __builtin_shufflevector(a, c, 2, 6, 3, 7),
                high13 = __builtin_shufflevector(b, d, 2, 6, 3, 7);
-    store(__builtin_shufflevector(low02, low13, 0, 4, 1, 5), to);
-    store(__builtin_shufflevector(low02, low13, 2, 6, 3, 7), to + toStride);
-    store(__builtin_shufflevector(high02, high13, 0, 4, 1, 5), to + 2 * toStride);
-    store(__builtin_shufflevector(high02, high13, 2, 6, 3, 7), to + 3 * toStride);
+    return {{__builtin_shufflevector(low02, low13, 0, 4, 1, 5),
+             __builtin_shufflevector(low02, low13, 2, 6, 3, 7),
+             __builtin_shufflevector(high02, high13, 0, 4, 1, 5),
+             __builtin_shufflevector(high02, high13, 2, 6, 3, 7)}};
 }
 
-// 8 x 8 transposes, one for every y: x is fastest in a block, z in a tile.
+// 8 x 8 transposes, one for every y: x is fastest in a block, z in a tile. A cache line of the tile at a
+// time.
+template <bool kStreams>
 void copyValues(const float* first, std::size_t rowStride, std::size_t layerStride, float* tile) {
     for (std::size_t x = 0; x < 8; x += 4)
-        for (std::size_t y = 0; y < 8; ++y)
-            for (std::size_t z = 0; z < 8; z += 4)
-                transpose(first + z * layerStride + y * rowStride + x, layerStride,
-                          tile + (x * 8 + y) * 8 + z, 64);
+        for (std::size_t y = 0; y < 8; y += 2) {
+            const float* const from = first + y * rowStride + x;
+            const FourByFour parts[4] = {loadTransposed(from, layerStride),
+                                         loadTransposed(from + 4 * layerStride, layerStride),
+                                         loadTransposed(from + rowStride, layerStride),
+                                         loadTransposed(from + rowStride + 4 * layerStride, layerStride)};
+            for (std::size_t i = 0; i < 4; ++i)
+                for (std::size_t part = 0; part < 4; ++part)
+                    store<kStreams>(parts[part].row[i], tile + ((x + i) * 8 + y) * 8 + part * 4);
+        }
 }
 
 void clearUncovered(const std::array<std::uint64_t, 8>& bits, float* tile) {
@@ -120,6 +142,10 @@ void BrickStore::put(std::size_t leaf, const BrickKey& key, const Block& block) 
     const Vec3i size = block.box.size();
     const std::size_t rowStride = std::size_t(size.x);
     const std::size_t layerStride = rowStride * std::size_t(size.y);
+    // What outgrows the caches goes past them.
+    const bool streams =
+        tiles_.size() * std::size_t(channels_) * kTilePoints * sizeof(float) >= kStreamedBytes;
+    const auto copy = streams ? copyValues<true> : copyValues<false>;
     std::array<std::uint64_t, 8> bits;
     std::size_t t = leaf * std::size_t(tileCount_);
     for (int x = 0; x < cells; x += kTileSize)
@@ -134,12 +160,13 @@ void BrickStore::put(std::size_t leaf, const BrickKey& key, const Block& block) 
                 tile->values = std::make_unique_for_overwrite<float[]>(std::size_t(channels_) * kTilePoints);
                 for (int c = 0; c < channels_; ++c) {
                     float* values = tile->values.get() + std::size_t(c) * kTilePoints;
-                    copyValues(block.values.data() + std::size_t(c) * block.count() + at, rowStride,
-                               layerStride, values);
+                    copy(block.values.data() + std::size_t(c) * block.count() + at, rowStride, layerStride,
+                         values);
                     if (cover == TileCover::some) clearUncovered(bits, values);
                 }
                 tiles_[t] = std::move(tile);
             }
+    if (streams) finishStreaming();
 }
 
 Tile& BrickStore::ensureTile(std::size_t leaf, int tile) {

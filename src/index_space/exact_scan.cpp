@@ -299,7 +299,8 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
                 point[t] = int(std::int64_t(e.base[t]) + std::int64_t(atT));
                 point[r] = int(std::int64_t(e.base[r]) + std::int64_t(atR));
                 const std::int64_t offset = output.offset(point);
-                if (output.owner[offset] == kNoOwner) {
+                if (output.marks[offset] == kNotCovered) {
+                    output.marks[offset] = kStartsRun;
                     output.owner[offset] = element;
                 } else {
                     ++counts.contested;
@@ -388,10 +389,18 @@ void ExactScanlines::ends(double atT, double atR, double& begin, double& end) co
 bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank,
                   std::int64_t offset) {
     std::int32_t& owner = output.owner[offset];
-    const std::int32_t present = owner & kElementMask;
-    if (!(owner & kRankKnown)) {
-        output.rank[offset] = ElementDepth(input.mesh, input.frame, present).rank(output.pointAt(offset));
-        owner |= kRankKnown;
+    const std::int32_t present = output.ownerAt(offset);
+    if (output.marks[offset] == kFollowsInRun || !(owner & kRankKnown)) {
+        // The point becomes a run of its own, and so does what is left of its run.
+        const Vec3i point = output.pointAt(offset);
+        const std::int64_t next = offset + 1;
+        if (point.x + 1 < output.region.max.x && output.marks[next] == kFollowsInRun) {
+            output.marks[next] = kStartsRun;
+            output.owner[next] = present;
+        }
+        output.marks[offset] = kStartsRun;
+        owner = present | kRankKnown;
+        output.rank[offset] = ElementDepth(input.mesh, input.frame, present).rank(point);
     }
     if (rank < output.rank[offset] || (rank == output.rank[offset] && element > present)) return false;
     owner = element | kRankKnown;

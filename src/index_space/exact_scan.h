@@ -21,10 +21,13 @@ struct ScanInput {
     std::span<const ScanChannel> channels;
 };
 
+/// How a scan marks the points that it covers: by one that starts a run, whose owner is noted there, and by
+/// those that follow it along x.
+inline constexpr std::uint8_t kNotCovered = 0, kFollowsInRun = 1, kStartsRun = 2;
+
 /// Bit of `owner` that says that `rank` holds the owner's rank.
 inline constexpr std::int32_t kRankKnown = 1 << 30;
 inline constexpr std::int32_t kElementMask = kRankKnown - 1;
-inline constexpr std::int32_t kNoOwner = -1;
 
 /// Where the samples go: arrays over `blockBox`, of which a scan fills only `region`.
 struct ScanOutput {
@@ -32,8 +35,15 @@ struct ScanOutput {
     IndexBox blockBox;
     std::int64_t stride[3];          ///< of x, y and z: 1, nx, nx ny
     std::span<float* const> values;  ///< one array a channel
-    std::int32_t* owner;             ///< kNoOwner, or the covering element, perhaps with kRankKnown
+    std::uint8_t* marks;             ///< kNotCovered at the start
+    std::int32_t* owner;             ///< at the start of a run: the covering element, perhaps with kRankKnown
     double* rank;  ///< ElementDepth::rank of the owner, written when a point becomes contested
+
+    /// The element that owns a covered point.
+    std::int32_t ownerAt(std::int64_t offset) const {
+        while (marks[offset] == kFollowsInRun) --offset;
+        return owner[offset] & kElementMask;
+    }
 
     std::int64_t offset(const Vec3i& p) const {
         const Vec3i q = p - blockBox.min;
@@ -59,7 +69,7 @@ struct ScanCounts {
 };
 
 /// True when `element`, which covers the point with this rank, owns it rather than the present owner. Updates
-/// owner and rank, not the values.
+/// marks, owner and rank, not the values.
 bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank,
                   std::int64_t offset);
 

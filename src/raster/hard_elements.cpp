@@ -58,25 +58,27 @@ std::vector<DecidedPoint> decideCell(const RasterInputs& inputs, std::span<const
                             coding.isOfCells()});
         valuePointers.push_back(values[c].data());
     }
-    std::vector<std::int32_t> owner(count, kNoOwner);
+    std::vector<std::uint8_t> marks(count, kNotCovered);
+    std::vector<std::int32_t> owner(count);
     std::vector<double> rank(count);
     const Vec3i size = cell.points.size();
     const ScanInput scanInput{inputs.mesh, inputs.frame, channels};
     const ScanOutput output{cell.points,   cell.points,  {1, size.x, std::int64_t(size.x) * size.y},
-                            valuePointers, owner.data(), rank.data()};
+                            valuePointers, marks.data(), owner.data(),
+                            rank.data()};
     ScanCounts counts;
     scanTargets().front().scan(scanInput, output, cell.elements, counts);
 
     std::vector<DecidedPoint> points;
     const float invalid = sampleMarks(inputs.format).invalid;
-    std::int32_t lastOwner = kNoOwner;
+    std::int32_t lastOwner = -1;
     std::optional<ElementDepth> depth;
     for (std::size_t i = 0; i < count; ++i) {
-        if (owner[i] < 0) continue;
+        if (marks[i] == kNotCovered) continue;
         const Vec3i at = output.pointAt(std::int64_t(i));
         const Vec3i pixel = at - region.min;
-        if ((owner[i] & kElementMask) != lastOwner) {
-            lastOwner = owner[i] & kElementMask;
+        if (const std::int32_t of = output.ownerAt(std::int64_t(i)); of != lastOwner) {
+            lastOwner = of;
             depth.emplace(inputs.mesh, inputs.frame, lastOwner);
         }
         DecidedPoint point{std::uint16_t(pixel[inputs.axes.s]),

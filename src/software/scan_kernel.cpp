@@ -102,6 +102,12 @@ struct alignas(64) Rows {
     int count = 0, hits = 0;
 };
 
+/// Of a short run: the first point starts it.
+alignas(16) constexpr std::uint8_t kRunMarks[16] = {
+    kStartsRun,    kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun,
+    kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun,
+    kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun};
+
 static_assert(std::endian::native == std::endian::little, "places are stored by the word");
 /// The places of the set bits of four, 16 bits each from the lowest on, and their count.
 struct SetBits {
@@ -182,7 +188,7 @@ struct Walk {
     ScanCounts& counts;
     double regionMin[3], regionLast[3], blockMin[3], stride[3];  // of the output, x y z
     std::optional<ElementDepth> depth;
-    std::int32_t depthOf = kNoOwner;
+    std::int32_t depthOf = -1;
 };
 
 // Two neighbouring numbers of each of as many nodes as there are lanes.
@@ -464,9 +470,10 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
     const std::int32_t element = scratch.element[lane];
     std::int64_t offset = rows.offset[row];
     for (int k = 0; k < rows.length[row]; ++k, offset += scratch.stride[lane]) {
-        std::int32_t& owner = walk.output.owner[offset];
-        if (owner == kNoOwner) {
-            owner = element;
+        std::uint8_t& mark = walk.output.marks[offset];
+        if (mark == kNotCovered) {
+            mark = kStartsRun;
+            walk.output.owner[offset] = element;
         } else {
             ++walk.counts.contested;
             if (!contestPoint(walk.input, walk.output, element, rankOf(walk, lane, offset), offset)) continue;
@@ -486,27 +493,35 @@ HWY_INLINE hn::VFromD<Floats> valuesAt(Floats df, const BatchChannel& channel, i
     return hn::Min(hn::Set(df, channel.high[lane]), hn::Max(hn::Set(df, channel.low[lane]), v));
 }
 
+// Marks a run that starts here and goes along x, or its points one by one where it goes another way. False
+// where another element covers one of them.
+HWY_INLINE bool markRun(std::uint8_t* marks, int length, std::int64_t stride) {
+    std::uint64_t present = 0;
+    int k = 0;
+    for (; stride == 1 && k + 8 <= length; k += 8) {
+        std::uint64_t eight;
+        std::memcpy(&eight, marks + k, sizeof eight);
+        present |= eight;
+    }
+    for (; k < length; ++k) present |= marks[k * stride];
+    if (present != 0) return false;
+    if (stride == 1) std::memset(marks, kFollowsInRun, std::size_t(length));
+    marks[0] = kStartsRun;
+    for (k = 1; stride != 1 && k < length; ++k) marks[k * stride] = kStartsRun;
+    return true;
+}
+
 // Writes a run of any length along any axis.
 HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
     const hn::ScalableTag<float> df;
-    const hn::RebindToSigned<decltype(df)> di;
     const int lanes = int(hn::Lanes(df));
     const Scratch& scratch = walk.scratch;
     const int length = scratch.rows.length[row], skipped = scratch.rows.skipped[row];
     const std::int64_t offset = scratch.rows.offset[row], stride = scratch.stride[lane];
+    if (!markRun(walk.output.marks + offset, length, stride)) return writeContestedRun(walk, lane, row);
+    for (int k = 0; k < (stride == 1 ? 1 : length); ++k)
+        walk.output.owner[offset + k * stride] = scratch.element[lane];
     const int whole = stride == 1 ? length - length % lanes : 0;  // voxels in whole vectors
-    std::int32_t* const owner = walk.output.owner + offset;
-    auto free = hn::Set(di, kNoOwner);
-    std::int32_t freeBeyond = kNoOwner;
-    for (int k = 0; k < whole; k += lanes) free = hn::And(free, hn::LoadU(di, owner + k));
-    for (int k = whole; k < length; ++k) freeBeyond &= owner[k * stride];
-    if (freeBeyond != kNoOwner || !hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) {
-        writeContestedRun(walk, lane, row);
-        return;
-    }
-    const std::int32_t element = scratch.element[lane];
-    for (int k = 0; k < whole; k += lanes) hn::StoreU(hn::Set(di, element), di, owner + k);
-    for (int k = whole; k < length; ++k) owner[k * stride] = element;
     for (std::size_t c = 0; c < walk.input.channels.size(); ++c) {
         const BatchChannel& channel = scratch.channels[c];
         float* const out = walk.output.values[c] + offset;
@@ -518,9 +533,10 @@ HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
     }
 }
 
-// Where short runs go: the block's owners and the values of its channels.
+// Where short runs go: the block's marks and owners, and the values of its channels.
 struct ShortRuns {
     const Scratch& scratch;
+    std::uint8_t* marks;
     std::int32_t* owners;
     float* const* values;
     std::size_t channels;
@@ -531,13 +547,14 @@ struct ShortRuns {
 #if HWY_TARGET <= HWY_AVX3
 HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
     const hn::FixedTag<float, kShortRun> df;
-    const hn::RebindToSigned<decltype(df)> di;
+    const hn::FixedTag<std::uint8_t, kShortRun> db;
     const std::size_t length = std::size_t(to.scratch.rows.length[row]);
     const std::int64_t offset = to.scratch.rows.offset[row];
-    const auto isInRun = hn::FirstN(di, length);
-    const auto present = hn::MaskedLoad(isInRun, di, to.owners + offset);
-    if (!hn::AllTrue(di, hn::Eq(present, hn::IfThenElseZero(isInRun, hn::Set(di, kNoOwner))))) return false;
-    hn::BlendedStore(hn::Set(di, to.scratch.element[lane]), isInRun, di, to.owners + offset);
+    const auto isInRun = hn::FirstN(db, length);
+    const auto present = hn::MaskedLoad(isInRun, db, to.marks + offset);
+    if (!hn::AllTrue(db, hn::Eq(present, hn::Zero(db)))) return false;
+    hn::BlendedStore(hn::Load(db, kRunMarks), isInRun, db, to.marks + offset);
+    to.owners[offset] = to.scratch.element[lane];
     const float skipped = float(to.scratch.rows.skipped[row]);
     for (std::size_t c = 0; c < to.channels; ++c)
         hn::BlendedStore(valuesAt(df, to.scratch.channels[c], lane, row, skipped), hn::FirstN(df, length), df,
@@ -547,18 +564,20 @@ HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
 #elif HWY_TARGET != HWY_SCALAR
 HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
     const hn::FixedTag<float, 4> df;
-    const hn::RebindToSigned<decltype(df)> di;
     const int length = to.scratch.rows.length[row];
     const std::int64_t offset = to.scratch.rows.offset[row];
-    std::int32_t* const owner = to.owners + offset;
-    const std::int32_t element = to.scratch.element[lane];
+    std::uint8_t* const marks = to.marks + offset;
     const float skipped = float(to.scratch.rows.skipped[row]);
+    // The front of a run is marked last: its back may overlap it.
     if (length >= 4) {
         const int last = length - 4;
-        const auto free = hn::And(hn::LoadU(di, owner), hn::LoadU(di, owner + last));
-        if (!hn::AllTrue(di, hn::Eq(free, hn::Set(di, kNoOwner)))) return false;
-        hn::StoreU(hn::Set(di, element), di, owner);
-        hn::StoreU(hn::Set(di, element), di, owner + last);
+        std::uint32_t front, back;
+        std::memcpy(&front, marks, sizeof front);
+        std::memcpy(&back, marks + last, sizeof back);
+        if ((front | back) != 0) return false;
+        std::memcpy(marks + last, kRunMarks + 1, sizeof back);
+        std::memcpy(marks, kRunMarks, sizeof front);
+        to.owners[offset] = to.scratch.element[lane];
         for (std::size_t c = 0; c < to.channels; ++c) {
             float* const out = to.values[c] + offset;
             const BatchChannel& channel = to.scratch.channels[c];
@@ -568,8 +587,10 @@ HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
         return true;
     }
     const int middle = length / 2, last = length - 1;
-    if ((owner[0] & owner[middle] & owner[last]) != kNoOwner) return false;
-    owner[0] = owner[middle] = owner[last] = element;
+    if ((marks[0] | marks[middle] | marks[last]) != 0) return false;
+    marks[last] = marks[middle] = kFollowsInRun;
+    marks[0] = kStartsRun;
+    to.owners[offset] = to.scratch.element[lane];
     for (std::size_t c = 0; c < to.channels; ++c) {
         float* const out = to.values[c] + offset;
         alignas(16) float v[4];
@@ -605,9 +626,9 @@ void writeRows(Walk& walk) {
     const std::size_t channels = walk.input.channels.size();
     if (channels == 1) {
         float* const only = values[0];
-        writeHits(walk, {scratch, walk.output.owner, &only, 1});
+        writeHits(walk, {scratch, walk.output.marks, walk.output.owner, &only, 1});
     } else {
-        writeHits(walk, {scratch, walk.output.owner, values, channels});
+        writeHits(walk, {scratch, walk.output.marks, walk.output.owner, values, channels});
     }
     scratch.rows.count = scratch.rows.hits = 0;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -37,14 +38,14 @@ constexpr std::int64_t kPointBytes = 13;
 // A block being filled, and what decides who owns its points. Kept and used again for the next block.
 struct Work {
     Block block;
-    std::vector<std::int32_t> owner;
-    std::unique_ptr<double[]> rank;  // meaningful only where owner has kRankKnown
-    std::size_t rankSize = 0;
+    std::unique_ptr<std::int32_t[]> owner;  // meaningful only where runs start
+    std::unique_ptr<double[]> rank;         // meaningful only where owner has kRankKnown
+    std::size_t ownersSize = 0;
     std::vector<float*> channelValues;
     std::atomic<int> regionsLeft{0};
 
     std::size_t memoryBytes() const {
-        return 4 * block.values.capacity() + block.coverage.capacity() + 4 * owner.capacity() + 8 * rankSize;
+        return 4 * block.values.capacity() + block.coverage.capacity() + 12 * ownersSize;
     }
 
     void prepare(const Lattice& lattice, const IndexBox& box, int channels) {
@@ -54,16 +55,31 @@ struct Work {
         const std::size_t count = block.count();
         block.values.resize(count * std::size_t(channels));
         block.coverage.resize(count);
-        owner.resize(count);
-        if (rankSize < count) {
-            rank.reset(new double[count]);
-            rankSize = count;
+        if (ownersSize < count) {
+            owner = std::make_unique_for_overwrite<std::int32_t[]>(count);
+            rank = std::make_unique_for_overwrite<double[]>(count);
+            ownersSize = count;
         }
         channelValues.resize(std::size_t(channels));
         for (std::size_t c = 0; c < channelValues.size(); ++c)
             channelValues[c] = block.values.data() + c * count;
     }
 };
+
+// Makes the marks of covered points 1, the block's coverage, and counts them.
+std::int64_t coverMarked(std::uint8_t* marks, std::int64_t count) {
+    constexpr std::uint64_t kOfEach = 0x0101010101010101;
+    std::int64_t covered = 0, i = 0;
+    for (; i + 8 <= count; i += 8) {
+        std::uint64_t eight;
+        std::memcpy(&eight, marks + i, sizeof eight);
+        eight = (eight | eight >> 1) & kOfEach;
+        std::memcpy(marks + i, &eight, sizeof eight);
+        covered += std::int64_t(eight * kOfEach >> 56);
+    }
+    for (; i < count; ++i) covered += marks[i] = marks[i] != kNotCovered;
+    return covered;
+}
 
 // A part of a box that one thread fills.
 struct Region {
@@ -257,7 +273,8 @@ class BoundSoftware : public BoundResampler {
                                 work.block.box,
                                 {1, size.x, std::int64_t(size.x) * size.y},
                                 work.channelValues,
-                                work.owner.data(),
+                                work.block.coverage.data(),
+                                work.owner.get(),
                                 work.rank.get()};
         const auto forEachRow = [&](const auto& visit) {
             if (region == work.block.box) return visit(std::int64_t(0), region.count());
@@ -266,23 +283,17 @@ class BoundSoftware : public BoundResampler {
                     visit(output.offset({region.min.x, y, z}), std::int64_t(region.size().x));
         };
         forEachRow([&](std::int64_t offset, std::int64_t length) {
-            std::fill_n(output.owner + offset, length, kNoOwner);
+            std::fill_n(output.marks + offset, length, kNotCovered);
         });
         target_.scan(input, output, elements, counts);
         std::int64_t covered = 0;
         forEachRow([&](std::int64_t offset, std::int64_t length) {
-            const std::int32_t* owner = output.owner + offset;
-            std::uint8_t* coverage = work.block.coverage.data() + offset;
-            int inRow = 0;
-            for (std::int64_t i = 0; i < length; ++i) {
-                coverage[i] = owner[i] >= 0;
-                inRow += coverage[i];
-            }
+            const std::int64_t inRow = coverMarked(output.marks + offset, length);
             covered += inRow;
             if (inRow == length) return;
             for (float* values : output.values)
                 for (std::int64_t i = 0; i < length; ++i)
-                    if (!coverage[i]) values[offset + i] = 0;
+                    if (output.marks[offset + i] == 0) values[offset + i] = 0;
         });
         return covered;
     }
