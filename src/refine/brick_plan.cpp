@@ -193,12 +193,13 @@ BrickTree BrickPlan::tree(Depth finest) const {
 
 namespace {
 
-// Marks of a box of bricks, one byte each, set from any thread.
+// Marks of a box of bricks, one byte each, set from any thread. A layer more on each axis, which stays empty,
+// tells neighbours by the difference of their positions.
 class BrickMarks {
   public:
     explicit BrickMarks(const BrickRange& range)
         : range_(range),
-          size_(range.max - range.min + 1),
+          size_(range.max - range.min + 2),
           marks_(std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z), 0) {}
     std::size_t position(int x, int y, int z) const {
         return (std::size_t(z - range_.min.z) * std::size_t(size_.y) + std::size_t(y - range_.min.y)) *
@@ -209,6 +210,12 @@ class BrickMarks {
         return std::atomic_ref<std::uint8_t>(marks_[position]);
     }
     std::atomic_ref<std::uint8_t> at(int x, int y, int z) { return at(position(x, y, z)); }
+    bool isMarked(std::size_t position) { return at(position).load(std::memory_order_relaxed) != 0; }
+    /// True for bricks that are one or have a side in common.
+    bool areBeside(std::size_t low, std::size_t high) const {
+        const std::size_t step = high - low, row = std::size_t(size_.x), layer = row * std::size_t(size_.y);
+        return (step == 0) | (step == 1) | (step == row) | (step == layer);
+    }
     std::int64_t count() const {
         std::int64_t sum = 0;
         for (const std::uint8_t mark : marks_) sum += mark;
@@ -227,18 +234,21 @@ struct NodeBrick {
     std::uint32_t nextAxes;
 };
 
-// The bricks of the nodes: as positions among the marks where one brick is all there is to a node (most
-// elements are settled by these), else kSeveral; and in full.
+// The bricks of the nodes: as positions among the marks where one brick is all there is to a node, else
+// kSeveral; and in full.
 struct NodeBricks {
     static constexpr std::uint32_t kSeveral = ~std::uint32_t(0);
     std::vector<std::uint32_t> position;
     std::vector<NodeBrick> brick;
-    /// The only brick that the element's nodes lie in, or kSeveral.
-    std::uint32_t single(const std::array<std::int32_t, 4>& tet) const {
-        const std::uint32_t first = position[std::size_t(tet[0])];
-        const bool same = first == position[std::size_t(tet[1])] && first == position[std::size_t(tet[2])] &&
-                          first == position[std::size_t(tet[3])];
-        return same ? first : kSeveral;
+    /// True where the element's nodes lie in a marked brick or two of them that are side by side.
+    bool areMarked(const std::array<std::int32_t, 4>& tet, BrickMarks& marks) const {
+        const auto of = [&](std::size_t k) { return position[std::size_t(tet[k])]; };
+        const std::uint32_t low = std::min({of(0), of(1), of(2), of(3)}),
+                            high = std::max({of(0), of(1), of(2), of(3)});
+        bool areTwo = true;
+        for (std::size_t k = 0; k < 4; ++k) areTwo &= (of(k) == low) | (of(k) == high);
+        return areTwo && high != kSeveral && marks.areBeside(low, high) && marks.isMarked(low) &&
+               marks.isMarked(high);
     }
 };
 
@@ -295,9 +305,7 @@ std::int64_t touchedBricks(const TetMesh& mesh, const PlanFrame& frame, std::int
                 for (const std::int32_t n : mesh.tets[std::size_t(std::min(e + kPrefetchElements, last))])
                     __builtin_prefetch(&nodes.position[std::size_t(n)]);
                 // Most bricks are marked already by an earlier element.
-                const std::uint32_t single = nodes.single(mesh.tets[std::size_t(e)]);
-                if (single != NodeBricks::kSeveral && marks.at(single).load(std::memory_order_relaxed))
-                    continue;
+                if (nodes.areMarked(mesh.tets[std::size_t(e)], marks)) continue;
                 const BrickRange own = elementRange(mesh, nodes.brick, e);
                 const Vec3i low = glm::max(own.min, range.min), high = glm::min(own.max, range.max);
                 element.reset();
