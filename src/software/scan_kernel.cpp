@@ -34,6 +34,8 @@ namespace tessera::scan_kernel {
 inline constexpr int kBatch = 8;
 /// So many rows of elements are solved before their runs are written.
 inline constexpr int kMostRows = 256;
+/// Vectors are stored whole.
+inline constexpr int kRowsRoom = kMostRows + 8;
 inline constexpr double kUnit = 0x1p-53;
 /// Nodes of a mesh that take less than this are near at hand without being fetched ahead.
 inline constexpr std::size_t kCacheBytes = std::size_t(1) << 19;
@@ -74,10 +76,12 @@ struct alignas(64) Batch {
     double shrink[4][kBatch];  // added to planeA: the face moved inwards by as much as it was moved outwards
     double gradient[4][3][kBatch], constant[4][kBatch];  // barycentrics: constant + gradient . (s, t, r)
     // The part of the element's box that lies in the region, relative to the element's first voxel:
-    double from[3][kBatch], lastS[kBatch];        // its first voxel, s t r, and its last one along s
-    double origin[kBatch], stride[3][kBatch];     // offset of that first voxel in the block; of s, t, r
+    double fromT[kBatch], fromR[kBatch];          // its first row
     double rowsT[kBatch], inverseT[kBatch];       // rows along t, and one over that
     std::int32_t countT[kBatch], countR[kBatch];  // rows; 0 where no voxel lies in the part
+    std::int32_t fromS[kBatch], lastS[kBatch];    // its first and last voxel along s
+    std::int32_t origin[kBatch];                  // offset of its first voxel in the block
+    std::int32_t strideS[kBatch], strideT[kBatch], strideR[kBatch];  // in the block
 };
 
 /// A channel of eight elements: value = constant + s, t, r times the gradient, limited to [low, high].
@@ -88,18 +92,25 @@ struct alignas(64) BatchChannel {
     float step[kBatch];              // difference from voxel to voxel along the scan axis
     unsigned finiteBits, floatBits;  // elements whose values are finite, and whose runs come out right in
                                      // float, too: no denormal steps, nor too many, nor overflowing ones
-    alignas(64) double first[kMostRows];  // value at the first voxel of the run, of the rows at work
+    alignas(64) double first[kRowsRoom];  // value at the first voxel of the run, of the rows at work
 
     bool isFinite(int lane) const { return finiteBits >> lane & 1; }
     bool isInFloat(int lane) const { return floatBits >> lane & 1; }
 };
 
-/// Rows of the elements at work: where each one's run starts in the block, how long it is there, and how many
-/// of its voxels lie before the region.
-struct alignas(64) Rows {
-    std::int32_t offset[kMostRows], length[kMostRows], skipped[kMostRows];
-    std::uint16_t hit[kMostRows + 4];  // the rows that have a run: row + kMostRows lane
-    int count = 0, hits = 0;
+/// Rows of the batch's elements that have a run in the region.
+struct alignas(64) FoundRows {
+    /// Numbers along t and r from the region's first row on, and the element's lane: t + 2^14 r + 2^28 lane.
+    std::int32_t place[kRowsRoom];
+    std::int32_t begin[kRowsRoom], last[kRowsRoom];  // first voxel of the run, and the last one in the region
+    int count = 0;
+};
+inline constexpr int kRowShift = 14, kLaneShift = 28;
+
+/// Their runs: where each starts in the block, how long it is there, how many of its voxels lie before the
+/// region, and the element's lane.
+struct alignas(64) Runs {
+    std::int32_t offset[kRowsRoom], length[kRowsRoom], skipped[kRowsRoom], lane[kRowsRoom];
 };
 
 /// Of a short run: the first point starts it.
@@ -107,20 +118,6 @@ alignas(16) constexpr std::uint8_t kRunMarks[16] = {
     kStartsRun,    kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun,
     kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun,
     kFollowsInRun, kFollowsInRun, kFollowsInRun, kFollowsInRun};
-
-static_assert(std::endian::native == std::endian::little, "places are stored by the word");
-/// The places of the set bits of four, 16 bits each from the lowest on, and their count.
-struct SetBits {
-    std::uint64_t places;
-    int count;
-};
-constexpr auto kSetBits = [] {
-    std::array<SetBits, 16> table{};
-    for (unsigned bits = 0; bits < 16; ++bits)
-        for (unsigned place = 0; place < 4; ++place)
-            if (bits >> place & 1) table[bits].places |= std::uint64_t(place) << 16 * table[bits].count++;
-    return table;
-}();
 
 /// The faces of an element, those first that bound s from below, by a bit for each that does.
 struct FaceOrder {
@@ -139,7 +136,8 @@ constexpr auto kFaceOrder = [] {
 struct Scratch {
     Batch batch;
     std::vector<BatchChannel> channels;  // one at least, which nothing is read of where there is none
-    Rows rows;
+    FoundRows found;
+    Runs runs;
     // Of the batch's elements:
     std::int32_t element[kBatch];
     std::int64_t stride[kBatch];  // along the scan axis
@@ -292,21 +290,28 @@ void setUpLanes(const Walk& walk, const double* const (&nodes)[4][kBatch], std::
             from[i] = first;
             to[i] = last;
         }
-        hn::Store(from[i], d, &batch.from[i][lane]);
-        hn::Store(stride[i], d, &batch.stride[i][lane]);
     }
-    hn::Store(to[0], d, &batch.lastS[lane]);
-    hn::Store(hn::Add(hn::Add(hn::Mul(hn::Add(from[0], base[0]), stride[0]),
-                              hn::Mul(hn::Add(from[1], base[1]), stride[1])),
-                      hn::Mul(hn::Add(from[2], base[2]), stride[2])),
-              d, &batch.origin[lane]);
+    const hn::Rebind<std::int32_t, D> di;
+    const auto storeWhole = [&](V value, std::int32_t(&list)[kBatch]) {
+        hn::Store(hn::DemoteTo(di, value), di, &list[lane]);
+    };
+    storeWhole(hn::Add(hn::Add(hn::Mul(hn::Add(from[0], base[0]), stride[0]),
+                               hn::Mul(hn::Add(from[1], base[1]), stride[1])),
+                       hn::Mul(hn::Add(from[2], base[2]), stride[2])),
+               batch.origin);
+    storeWhole(stride[0], batch.strideS);
+    storeWhole(stride[1], batch.strideT);
+    storeWhole(stride[2], batch.strideR);
+    storeWhole(from[0], batch.fromS);
+    storeWhole(to[0], batch.lastS);
+    hn::Store(from[1], d, &batch.fromT[lane]);
+    hn::Store(from[2], d, &batch.fromR[lane]);
     const V rowsT = hn::IfThenElseZero(isSome, hn::Add(hn::Sub(to[1], from[1]), one)),
             rowsR = hn::IfThenElseZero(isSome, hn::Add(hn::Sub(to[2], from[2]), one));
-    const hn::Rebind<std::int32_t, D> di;
     hn::Store(rowsT, d, &batch.rowsT[lane]);
     hn::Store(hn::Div(one, rowsT), d, &batch.inverseT[lane]);
-    hn::Store(hn::DemoteTo(di, rowsT), di, &batch.countT[lane]);
-    hn::Store(hn::DemoteTo(di, rowsR), di, &batch.countR[lane]);
+    storeWhole(rowsT, batch.countT);
+    storeWhole(rowsR, batch.countR);
 
     // Barycentric gradients: cross products of two edges over six times the volume.
     V e[3][3];
@@ -466,10 +471,10 @@ double rankOf(Walk& walk, int lane, std::int64_t offset) {
 // Points of the run that another element covers already: the deeper one owns them.
 HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
     const Scratch& scratch = walk.scratch;
-    const Rows& rows = scratch.rows;
+    const Runs& runs = scratch.runs;
     const std::int32_t element = scratch.element[lane];
-    std::int64_t offset = rows.offset[row];
-    for (int k = 0; k < rows.length[row]; ++k, offset += scratch.stride[lane]) {
+    std::int64_t offset = runs.offset[row];
+    for (int k = 0; k < runs.length[row]; ++k, offset += scratch.stride[lane]) {
         std::uint8_t& mark = walk.output.marks[offset];
         if (mark == kNotCovered) {
             mark = kStartsRun;
@@ -478,7 +483,7 @@ HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
             ++walk.counts.contested;
             if (!contestPoint(walk.input, walk.output, element, rankOf(walk, lane, offset), offset)) continue;
         }
-        const double number = double(rows.skipped[row]) + k;
+        const double number = double(runs.skipped[row]) + k;
         for (std::size_t c = 0; c < walk.input.channels.size(); ++c)
             walk.output.values[c][offset] = valueAt(scratch.channels[c], lane, row, number);
     }
@@ -516,8 +521,8 @@ HWY_NOINLINE void writeRun(Walk& walk, int lane, int row) {
     const hn::ScalableTag<float> df;
     const int lanes = int(hn::Lanes(df));
     const Scratch& scratch = walk.scratch;
-    const int length = scratch.rows.length[row], skipped = scratch.rows.skipped[row];
-    const std::int64_t offset = scratch.rows.offset[row], stride = scratch.stride[lane];
+    const int length = scratch.runs.length[row], skipped = scratch.runs.skipped[row];
+    const std::int64_t offset = scratch.runs.offset[row], stride = scratch.stride[lane];
     if (!markRun(walk.output.marks + offset, length, stride)) return writeContestedRun(walk, lane, row);
     for (int k = 0; k < (stride == 1 ? 1 : length); ++k)
         walk.output.owner[offset + k * stride] = scratch.element[lane];
@@ -548,14 +553,14 @@ struct ShortRuns {
 HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
     const hn::FixedTag<float, kShortRun> df;
     const hn::FixedTag<std::uint8_t, kShortRun> db;
-    const std::size_t length = std::size_t(to.scratch.rows.length[row]);
-    const std::int64_t offset = to.scratch.rows.offset[row];
+    const std::size_t length = std::size_t(to.scratch.runs.length[row]);
+    const std::int64_t offset = to.scratch.runs.offset[row];
     const auto isInRun = hn::FirstN(db, length);
     const auto present = hn::MaskedLoad(isInRun, db, to.marks + offset);
     if (!hn::AllTrue(db, hn::Eq(present, hn::Zero(db)))) return false;
     hn::BlendedStore(hn::Load(db, kRunMarks), isInRun, db, to.marks + offset);
     to.owners[offset] = to.scratch.element[lane];
-    const float skipped = float(to.scratch.rows.skipped[row]);
+    const float skipped = float(to.scratch.runs.skipped[row]);
     for (std::size_t c = 0; c < to.channels; ++c)
         hn::BlendedStore(valuesAt(df, to.scratch.channels[c], lane, row, skipped), hn::FirstN(df, length), df,
                          to.values[c] + offset);
@@ -564,10 +569,10 @@ HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
 #elif HWY_TARGET != HWY_SCALAR
 HWY_INLINE bool writeShortRun(const ShortRuns& to, int lane, int row) {
     const hn::FixedTag<float, 4> df;
-    const int length = to.scratch.rows.length[row];
-    const std::int64_t offset = to.scratch.rows.offset[row];
+    const int length = to.scratch.runs.length[row];
+    const std::int64_t offset = to.scratch.runs.offset[row];
     std::uint8_t* const marks = to.marks + offset;
-    const float skipped = float(to.scratch.rows.skipped[row]);
+    const float skipped = float(to.scratch.runs.skipped[row]);
     // The front of a run is marked last: its back may overlap it.
     if (length >= 4) {
         const int last = length - 4;
@@ -607,30 +612,84 @@ bool writeShortRun(const ShortRuns&, int, int) {
 }
 #endif
 
-HWY_INLINE void writeHits(Walk& walk, const ShortRuns& to) {
-    const Rows& rows = walk.scratch.rows;
-    const int hits = rows.hits;
-    for (int i = 0; i < hits; ++i) {
-        const int row = rows.hit[i] % kMostRows, lane = rows.hit[i] / kMostRows;
-        if (HWY_UNLIKELY(rows.length[row] > walk.scratch.longest[lane]))
+HWY_INLINE void writeRuns(Walk& walk, const ShortRuns& to) {
+    const Runs& runs = walk.scratch.runs;
+    const int count = walk.scratch.found.count;
+    for (int row = 0; row < count; ++row) {
+        const int lane = runs.lane[row];
+        if (HWY_UNLIKELY(runs.length[row] > walk.scratch.longest[lane]))
             writeRun(walk, lane, row);
         else if (HWY_UNLIKELY(!writeShortRun(to, lane, row)))
             writeContestedRun(walk, lane, row);
     }
 }
 
-// Writes the runs of the rows at work. Most are short, and most meshes' fields sampled one by one.
-void writeRows(Walk& walk) {
+/// Lambdas that hold an inner loop: as one function of its own it would keep its vectors in memory.
+#define TESSERA_INLINE __attribute__((always_inline))
+
+// Numbers of the elements of these lanes.
+template <class Tag, class T>
+HWY_INLINE hn::VFromD<Tag> ofLanes(Tag tag, const T (&table)[kBatch],
+                                   hn::VFromD<hn::RebindToSigned<Tag>> lanes) {
+    if constexpr (int(hn::MaxLanes(Tag())) == kBatch)
+        return hn::TableLookupLanes(hn::Load(tag, table), hn::IndicesFromVec(tag, lanes));
+    else
+        return hn::GatherIndex(tag, table, lanes);
+}
+
+// Makes runs of the rows found: their places in the block and the values that they begin with.
+void startRuns(Walk& walk) {
+    constexpr int kLanes = int(hn::MaxLanes(D()));
+    const D d;
+    const hn::Rebind<std::int32_t, D> di;
+    const hn::Rebind<std::int64_t, D> dl;
+    Scratch& scratch = walk.scratch;
+    const Batch& batch = scratch.batch;
+    const FoundRows& found = scratch.found;
+    Runs& runs = scratch.runs;
+    BatchChannel* const channels = scratch.channels.data();
+    const std::size_t channelCount = walk.input.channels.size();
+    const auto rowMask = hn::Set(di, (1 << kRowShift) - 1), one = hn::Set(di, 1);
+    for (int i = 0; i < found.count; i += kLanes) {
+        const auto place = hn::Load(di, found.place + i), begin = hn::Load(di, found.begin + i);
+        const auto lane = hn::ShiftRight<kLaneShift>(place);
+        const auto inT = hn::And(place, rowMask), inR = hn::And(hn::ShiftRight<kRowShift>(place), rowMask);
+        const auto whole = [&](const std::int32_t(&of)[kBatch])
+                               TESSERA_INLINE { return ofLanes(di, of, lane); };
+        const auto fromS = whole(batch.fromS), first = hn::Max(begin, fromS);
+        const auto inRows = hn::Add(hn::Mul(inT, whole(batch.strideT)), hn::Mul(inR, whole(batch.strideR)));
+        const auto inRow = hn::Mul(hn::Sub(first, fromS), whole(batch.strideS));
+        hn::Store(hn::Add(hn::Add(whole(batch.origin), inRows), inRow), di, runs.offset + i);
+        hn::Store(hn::Add(hn::Sub(hn::Load(di, found.last + i), first), one), di, runs.length + i);
+        hn::Store(hn::Sub(first, begin), di, runs.skipped + i);
+        hn::Store(lane, di, runs.lane + i);
+        const auto longLane = hn::PromoteTo(dl, lane);
+        const auto real = [&](const double(&of)[kBatch]) TESSERA_INLINE { return ofLanes(d, of, longLane); };
+        const V t = hn::Add(real(batch.fromT), hn::PromoteTo(d, inT)),
+                r = hn::Add(real(batch.fromR), hn::PromoteTo(d, inR)), s = hn::PromoteTo(d, begin);
+        for (std::size_t c = 0; c < channelCount; ++c) {
+            BatchChannel& channel = channels[c];
+            const V ofT = hn::Add(real(channel.constant), hn::Mul(real(channel.gradientT), t));
+            hn::Store(hn::Add(hn::Add(ofT, hn::Mul(real(channel.gradientR), r)),
+                              hn::Mul(real(channel.gradientS), s)),
+                      d, channel.first + i);
+        }
+    }
+}
+
+// Writes the runs of the rows found. Most are short, and most meshes' fields sampled one by one.
+void writeFound(Walk& walk) {
+    startRuns(walk);
     Scratch& scratch = walk.scratch;
     float* const* const values = walk.output.values.data();
     const std::size_t channels = walk.input.channels.size();
     if (channels == 1) {
         float* const only = values[0];
-        writeHits(walk, {scratch, walk.output.marks, walk.output.owner, &only, 1});
+        writeRuns(walk, {scratch, walk.output.marks, walk.output.owner, &only, 1});
     } else {
-        writeHits(walk, {scratch, walk.output.marks, walk.output.owner, values, channels});
+        writeRuns(walk, {scratch, walk.output.marks, walk.output.owner, values, channels});
     }
-    scratch.rows.count = scratch.rows.hits = 0;
+    scratch.found.count = 0;
 }
 
 // Where faces leave scanlines room: s from the greatest bound of the first `lower` faces to the least of the
@@ -677,9 +736,6 @@ HWY_NOINLINE void decideEnds(const ExactScanlines& exact, unsigned doubtful, V t
     end = hn::Load(d, ends);
 }
 
-/// Lambdas that hold an inner loop: as one function of its own it would keep its vectors in memory.
-#define TESSERA_INLINE __attribute__((always_inline))
-
 /// How the rows of an element are put into vectors.
 enum class RowOrder {
     packed,   ///< side by side, whatever their number along t
@@ -694,11 +750,10 @@ HWY_NOINLINE void solveRows(Walk& walk, int lane) {
     constexpr int kLanes = int(hn::MaxLanes(D()));
     const D d;
     const hn::Rebind<std::int32_t, D> di;
+    using Whole = hn::VFromD<decltype(di)>;
     Scratch& scratch = walk.scratch;
     const Batch& batch = scratch.batch;
-    Rows& rows = scratch.rows;
-    BatchChannel* const channels = scratch.channels.data();
-    const std::size_t channelCount = std::max<std::size_t>(1, walk.input.channels.size());
+    FoundRows& found = scratch.found;
     const auto ofLane = [&](const double(&of)[kBatch]) { return hn::Set(d, of[lane]); };
     const FaceOrder& order = kFaceOrder[std::size_t(batch.lower[lane])];
     M isLower[4];
@@ -711,26 +766,23 @@ HWY_NOINLINE void solveRows(Walk& walk, int lane) {
         planeC[i] = ofLane(batch.planeC[face]);
     }
     const Room whole{ofLane(batch.minS), ofLane(batch.maxS)};
-    const V fromS = ofLane(batch.from[0]), fromT = ofLane(batch.from[1]), fromR = ofLane(batch.from[2]),
-            lastS = ofLane(batch.lastS), origin = ofLane(batch.origin), strideS = ofLane(batch.stride[0]),
-            strideT = ofLane(batch.stride[1]), strideR = ofLane(batch.stride[2]), one = hn::Set(d, 1.0);
+    const V fromT = ofLane(batch.fromT), fromR = ofLane(batch.fromR), one = hn::Set(d, 1.0);
+    const Whole fromS = hn::Set(di, batch.fromS[lane]), lastS = hn::Set(di, batch.lastS[lane]);
     std::optional<ExactScanlines> exact;
     const int countT = batch.countT[lane], countR = batch.countR[lane], count = countT * countR;
     walk.counts.scanlines += count;
 
     // What t decides of the rows of a vector: it is the same for all r where they are aligned.
     struct AlongT {
-        V t, bounds[4], value, offset;
+        V t, bounds[4];
+        Whole place;
     } along;
     const auto goAlongT = [&](V inT) TESSERA_INLINE {
         along.t = hn::Add(fromT, inT);
+        along.place = hn::Add(hn::DemoteTo(di, inT), hn::Set(di, lane << kLaneShift));
         for (int i = 0; i < 4; ++i) along.bounds[i] = hn::Add(planeA[i], hn::Mul(planeB[i], along.t));
-        along.offset = hn::Add(origin, hn::Mul(inT, strideT));
     };
-    const auto valueAlongT = [&](const BatchChannel& channel) {
-        return hn::Add(ofLane(channel.constant), hn::Mul(ofLane(channel.gradientT), along.t));
-    };
-    const auto solve = [&](V inR, unsigned used, int at, int& hits) TESSERA_INLINE {
+    const auto solve = [&](V inR, Whole placeR, auto used, int& some) TESSERA_INLINE {
         const V r = hn::Add(fromR, inR);
         V bounds[4];
         for (int i = 0; i < 4; ++i) bounds[i] = hn::Add(along.bounds[i], hn::Mul(planeC[i], r));
@@ -742,69 +794,50 @@ HWY_NOINLINE void solveRows(Walk& walk, int lane) {
                 bounds[i] = hn::Add(hn::Add(inner, hn::Mul(planeB[i], along.t)), hn::Mul(planeC[i], r));
             }
             const Room inner = narrow<kIsCareful>(whole, bounds, isLower);
-            const unsigned doubtful = used & bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
+            const unsigned doubtful = bitsOf(doubtfulEnds(inner.low, inner.high, begin, last));
             if (batch.grade[lane] == kDoubtful && doubtful != 0) {
                 if (!exact) exact.emplace(walk.input, scratch.element[lane], int(batch.axis[lane]));
                 decideEnds(*exact, doubtful, along.t, r, begin, last);
             }
         }
-        for (std::size_t c = 0; c < channelCount; ++c) {
-            const BatchChannel& channel = channels[c];
-            const V ofT = kIsAligned && c == 0 ? along.value : valueAlongT(channel);
-            hn::Store(hn::Add(hn::Add(ofT, hn::Mul(ofLane(channel.gradientR), r)),
-                              hn::Mul(ofLane(channel.gradientS), begin)),
-                      d, channels[c].first + at);
-        }
-        const auto keep = [&](V value, std::int32_t* list) {
-            hn::Store(hn::DemoteTo(di, value), di, list + at);
+        const Whole from = hn::DemoteTo(di, begin), to = hn::Min(hn::DemoteTo(di, last), lastS);
+        const auto hit = hn::AndNot(hn::Gt(hn::Max(from, fromS), to), used);
+        const auto keep = [&](Whole v, std::int32_t* list) {
+            hn::StoreU(hn::Compress(v, hit), di, list + some);
         };
-        const V first = hn::Max(begin, fromS);
-        last = hn::Min(last, lastS);
-        // Offsets in the block are whole numbers in double, but that of the element's own first voxel might
-        // not be.
-        const V inRow = hn::Add(along.offset, hn::Mul(inR, strideR));
-        keep(hn::Sub(first, begin), rows.skipped);
-        keep(hn::Add(inRow, hn::Mul(hn::Sub(first, fromS), strideS)), rows.offset);
-        keep(hn::Add(hn::Sub(last, first), one), rows.length);
-        const unsigned hit = used & bitsOf(hn::Le(first, last));
-        for (int q = 0; q < kLanes; q += 4) {
-            const SetBits& set = kSetBits[(hit >> q) & 15];
-            const std::uint64_t four =
-                set.places + std::uint64_t(at + q + lane * kMostRows) * 0x0001000100010001u;
-            std::memcpy(rows.hit + hits, &four, sizeof four);
-            hits += set.count;
-        }
+        keep(hn::Add(along.place, placeR), found.place);
+        keep(from, found.begin);
+        keep(to, found.last);
+        some += int(hn::CountTrue(di, hit));
     };
-    // Calls work(step, at, hits) for so many vectors of rows, with the places of each.
+    // Calls work(step, found rows) for so many vectors of rows.
     const auto forVectors = [&](int vectors, const auto& work) TESSERA_INLINE {
         for (int done = 0; done < vectors;) {
-            if (rows.count == kMostRows) writeRows(walk);
-            const int some = std::min(vectors - done, (kMostRows - rows.count) / kLanes);
-            int at = rows.count, hits = rows.hits;
-            for (const int end = done + some; done < end; ++done, at += kLanes) work(done, at, hits);
-            rows.count = at;
-            rows.hits = hits;
+            if (found.count > kMostRows - kLanes) writeFound(walk);
+            int some = found.count;
+            for (const int end = std::min(vectors, done + (kMostRows - some) / kLanes); done < end; ++done)
+                work(done, some);
+            found.count = some;
         }
     };
-    const auto usedOf = [&](int rowsLeft) { return (1u << std::min(rowsLeft, kLanes)) - 1; };
     if constexpr (kIsAligned) {
         for (int done = 0; done < countT; done += kLanes) {
             goAlongT(hn::Iota(d, double(done)));
-            along.value = valueAlongT(channels[0]);
-            const unsigned used = usedOf(countT - done);
+            const auto used = hn::FirstN(di, std::size_t(countT - done));
             V inR = hn::Zero(d);
-            forVectors(countR, [&](int, int at, int& hits) TESSERA_INLINE {
-                solve(inR, used, at, hits);
+            forVectors(countR, [&](int step, int& some) TESSERA_INLINE {
+                solve(inR, hn::Set(di, step << kRowShift), used, some);
                 inR = hn::Add(inR, one);
             });
         }
     } else {
         const V rowsT = ofLane(batch.rowsT), inverseT = ofLane(batch.inverseT), half = hn::Set(d, 0.5);
-        forVectors((count + kLanes - 1) / kLanes, [&](int step, int at, int& hits) TESSERA_INLINE {
+        forVectors((count + kLanes - 1) / kLanes, [&](int step, int& some) TESSERA_INLINE {
             const V number = hn::Iota(d, double(step * kLanes));
             const V inR = hn::Floor(hn::Mul(hn::Add(number, half), inverseT));
             goAlongT(hn::Sub(number, hn::Mul(inR, rowsT)));
-            solve(inR, usedOf(count - step * kLanes), at, hits);
+            solve(inR, hn::ShiftLeft<kRowShift>(hn::DemoteTo(di, inR)),
+                  hn::FirstN(di, std::size_t(count - step * kLanes)), some);
         });
     }
 }
@@ -820,7 +853,6 @@ void walkElement(Walk& walk, int lane) {
     const Batch& batch = scratch.batch;
     if (batch.countT[lane] * batch.countR[lane] == 0) return;
     if (batch.grade[lane] == kThin) {
-        writeRows(walk);
         scanElementExactly(walk.input, walk.output, scratch.element[lane], walk.counts);
         return;
     }
@@ -858,7 +890,7 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
           ScanCounts& counts) {
     static thread_local Scratch scratch;
     scratch.channels.resize(std::max<std::size_t>(1, input.channels.size()));
-    scratch.rows.count = scratch.rows.hits = 0;  // an exception may have left some
+    scratch.found.count = 0;  // an exception may have left some
     Walk walk{input, output, scratch, counts, {}, {}, {}, {}, {}};
     for (int a = 0; a < 3; ++a) {
         walk.regionMin[a] = output.region.min[a];
@@ -881,7 +913,7 @@ void scan(const ScanInput& input, const ScanOutput& output, std::span<const std:
         }
         std::copy_n(batchElements, count, scratch.element);
         for (int lane = 0; lane < count; ++lane) walkElement(walk, lane);
-        writeRows(walk);
+        writeFound(walk);
     }
 }
 
