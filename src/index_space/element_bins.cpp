@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "base/check.h"
 #include "base/parallel.h"
 #include "index_space/near_kernel.h"
 
@@ -29,10 +30,10 @@ class RegionGrid {
         const Vec3i usual(sum / double(regions.size()));
         std::size_t cells = 1;
         for (int a = 0; a < 3; ++a) {
-            const int extent = box.max[a] - box.min[a];
-            const int edge = std::max(usual[a], (extent + kMostCells - 1) / kMostCells);
+            const std::int64_t extent = std::int64_t(box.max[a]) - box.min[a];
+            const int edge = std::max(usual[a], int((extent + kMostCells - 1) / kMostCells));
             grid_.shift[a] = std::bit_width(unsigned(edge) - 1);
-            grid_.cells[a] = ((extent - 1) >> grid_.shift[a]) + 1;
+            grid_.cells[a] = int((extent - 1) >> grid_.shift[a]) + 1;
             cells *= std::size_t(grid_.cells[a]);
         }
         first_.assign(cells + 1, 0);
@@ -140,6 +141,7 @@ ElementBins binElements(const TetMesh& mesh, const NodeFrame& frame, std::span<c
     ElementBins bins;
     bins.first.assign(regions.size() + 1, 0);
     if (regions.empty()) return bins;
+    TESSERA_CHECK(!test.dropsBetween || test.marginVoxels == 0, "what lies between points may be near them");
     const RegionGrid grid(regions);
     const std::int64_t elements = mesh.elementCount();
     const std::int64_t chunk = std::max<std::int64_t>(4096, elements / (8 * execution.threadCount()) + 1);

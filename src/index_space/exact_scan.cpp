@@ -342,6 +342,9 @@ void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::i
     const auto& tet = mesh.tets[std::size_t(element)];
     if (hasRepeatedNode(mesh, tet)) return;
     const auto corner = [&](std::size_t k) { return mesh.points[std::size_t(tet[k])]; };
+    for (std::size_t k = 0; k < 4; ++k)
+        for (int a = 0; a < 3; ++a)
+            if (!std::isfinite(corner(k)[a])) return;
     if (volumeSign(corner(0), corner(1), corner(2), corner(3)) == 0) return;
     ++counts.exactElements;
     ExactElement<Quad> quad;

@@ -296,6 +296,17 @@ TEST(SoftwareResampler, EveryTargetAndCutIntoRegionsGivesTheSameBits) {
     }
 }
 
+// The deepest element owns a point that several cover, whichever came first.
+TEST(SoftwareResampler, TheOrderOfElementsDecidesNothing) {
+    TetMesh mesh = manyElements(600);
+    const IndexBox box{{0, 0, 0}, {70, 33, 20}};
+    for (const std::string& target : SoftwareResampler().targets()) {
+        const Sampled ascending = sampled(mesh, std::vector<int>{0}, {.target = target}, box, 1);
+        std::shuffle(mesh.tets.begin(), mesh.tets.end(), std::mt19937_64(5));
+        EXPECT_EQ(sampled(mesh, std::vector<int>{0}, {.target = target}, box, 1), ascending) << target;
+    }
+}
+
 TEST(SoftwareResampler, ElementsThatReachFarBeyondTheLatticeCoverAllOfIt) {
     for (const double reach : {1e10, 1e17, 1e30, 1e100}) {
         TetMesh mesh;
@@ -312,8 +323,8 @@ TEST(SoftwareResampler, ElementsThatReachFarBeyondTheLatticeCoverAllOfIt) {
 TEST(SoftwareResampler, ElementsWithoutAPlaceCoverNothing) {
     for (const double nowhere : {double(NAN), double(INFINITY)}) {
         TetMesh mesh;
-        mesh.points = {{4, 4, 4.2}, {6, 4, 4.4}, {4, 6, 4.6}, {5, nowhere, 4.8}};
-        mesh.tets = {{0, 1, 2, 3}};
+        mesh.points = {{4, 4, 4.2}, {6, 4, 4.4}, {4, 6, 4.6}, {5, nowhere, 4.8}, {nowhere, 5, 5}};
+        mesh.tets = {{0, 1, 2, 3}, {0, 1, 2, 4}, {4, 2, 1, 3}};
         for (const Route route : {Route::pass, Route::index}) {
             const Sampled result =
                 sampled(mesh, {}, {.target = {}, .route = route}, {{3, 3, 3}, {8, 8, 8}}, 1);
