@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstring>
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include "base/check.h"
 
@@ -48,14 +51,14 @@ Four load(const float* from) {
 template <bool kStreams>
 void store(const Four& four, float* to) {
 #ifdef __SSE__
-    if constexpr (kStreams) return __builtin_ia32_movntps(to, four);
+    if constexpr (kStreams) return _mm_stream_ps(to, __m128(four));
 #endif
     std::memcpy(to, &four, sizeof four);
 }
 // Other threads see what was streamed only after this.
 void finishStreaming() {
 #ifdef __SSE__
-    __builtin_ia32_sfence();
+    _mm_sfence();
 #endif
 }
 
