@@ -20,7 +20,7 @@ set_tests_properties(${contract_tests} PROPERTIES TIMEOUT 900)
 # run the program itself for the whole.
 function(tessera_split_device_tests)
   set(others "")
-  foreach(name Slicing Hybrid)
+  foreach(name Slicing Hybrid Compute)
     string(TOLOWER ${name} algorithm)
     if(TARGET tessera_${algorithm})
       list(APPEND others "*${name}*")

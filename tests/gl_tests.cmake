@@ -21,4 +21,4 @@ foreach(library EGL:egl:libEGL.so.1 OSMESA:osmesa:libOSMesa.so.8 GL:gl:libGL.so.
   add_dependencies(gl_trial_test broken_${folder})
 endforeach()
 set_tests_properties(gl_test gl_draw_test gl_trial_test PROPERTIES TIMEOUT 300)
-tessera_test(device_samples_test FOLDER device LINK reference slicing hybrid software)
+tessera_test(device_samples_test FOLDER device LINK reference slicing hybrid compute software)

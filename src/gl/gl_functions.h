@@ -90,7 +90,7 @@
     X(PROGRAMUNIFORM1UI, ProgramUniform1ui) X(PROGRAMUNIFORM1UIV, ProgramUniform1uiv) \
     X(PROGRAMUNIFORM2D, ProgramUniform2d) X(PROGRAMUNIFORM2F, ProgramUniform2f) \
     X(PROGRAMUNIFORM2FV, ProgramUniform2fv) X(PROGRAMUNIFORM2I, ProgramUniform2i) \
-    X(PROGRAMUNIFORM2IV, ProgramUniform2iv) X(PROGRAMUNIFORM2UI, ProgramUniform2ui) \
+    X(PROGRAMUNIFORM2IV, ProgramUniform2iv) X(PROGRAMUNIFORM2UI, ProgramUniform2ui) X(PROGRAMUNIFORM2UIV, ProgramUniform2uiv) \
     X(PROGRAMUNIFORM3D, ProgramUniform3d) X(PROGRAMUNIFORM3F, ProgramUniform3f) \
     X(PROGRAMUNIFORM3FV, ProgramUniform3fv) X(PROGRAMUNIFORM3I, ProgramUniform3i) \
     X(PROGRAMUNIFORM3IV, ProgramUniform3iv) X(PROGRAMUNIFORM3UI, ProgramUniform3ui) \

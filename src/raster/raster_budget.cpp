@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "raster/point_scan.h"
 #include "raster/prepared_region.h"
 
 namespace tessera {
@@ -32,13 +33,13 @@ RasterBudget shareOut(std::int64_t workBytes, int channels) {
     const auto bytes = double(workBytes > 0 ? std::max(workBytes, memory.least) : memory.most);
     const std::int64_t recorded = std::max(1, channels);
     const std::int64_t passes = (recorded + kPassChannels - 1) / kPassChannels;
-    const double codeBytes = recorded > 1 ? 16 : 4, depthBytes = 4;
+    const double codeBytes = recorded > 1 ? 16 : 4, depthBytes = 16;  // depths, or what a scan notes
     const double pointBytes =
         kTargetRoom * (codeBytes + depthBytes) + kRegionsAtOnce * double(passes) * codeBytes;
-    const double records =
-        sizeof(SliceElement) + sizeof(EasyGeometry) + sizeof(ChannelRecord) * double(recorded);
-    const double onDevice =
-        sizeof(EasyGeometry) + sizeof(ChannelRecord) * double(std::min(recorded, kPassChannels));
+    const double records = sizeof(SliceElement) + sizeof(ScanBox) + sizeof(EasyGeometry) +
+                           sizeof(ChannelRecord) * double(recorded);
+    const double onDevice = sizeof(EasyGeometry) + sizeof(ScanBox) + 4.0 * kScanBoxWords +
+                            sizeof(ChannelRecord) * double(std::min(recorded, kPassChannels));
     const double elementBytes = kRegionsAtOnce * (kRecordRoom * records + kBufferRoom * onDevice);
     // The last eighth is for blocks that are put together and for what an emulated device keeps of
     // primitives.

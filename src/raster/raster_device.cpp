@@ -19,6 +19,10 @@ namespace {
 constexpr int kPadding = kSmallExtent + 2;
 /// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
 constexpr const char* kDepthScale = "1.220703125e-4";
+/// Of a scan: threads of a workgroup, workgroups along one axis of a dispatch, and bytes of what it notes.
+constexpr std::size_t kGroupThreads = 64;
+constexpr std::size_t kGroupsARow = 32768;
+constexpr std::int64_t kMarkBytes = 8, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
 /// corners.
 constexpr std::size_t kVerticesAtOnce = std::size_t(3) << 14;
@@ -93,28 +97,67 @@ const GlProgram& RasterDevice::program(GlContext& context, const Variant& varian
     if (isLayered_) defines.push_back({"LAYERED"});
     if (variant.stage == Stage::silhouettes) defines.push_back({"SILHOUETTE"});
     const bool isPublished = variant.stage == Stage::silhouettes || variant.stage == Stage::gouraud;
+    const std::vector<ShaderText> output{text::kDecide, text::kSampleCodes, text::kSampleOutput};
     GlProgram made =
-        isPublished ? makeProgram(context,
-                                  {{GL_VERTEX_SHADER, text::kPublishedVertex},
-                                   {GL_FRAGMENT_SHADER, text::kPublishedFragment, {text::kSampleOutput}}},
-                                  defines)
+        variant.stage >= Stage::elementFirst ? makeScanProgram(context, variant, defines)
+        : isPublished                        ? makeProgram(context,
+                                                           {{GL_VERTEX_SHADER, text::kPublishedVertex},
+                                                            {GL_FRAGMENT_SHADER, text::kPublishedFragment, output}},
+                                                           defines)
         : variant.stage == Stage::points
             ? makeProgram(context,
                           {{GL_VERTEX_SHADER, text::kPointVertex},
-                           {GL_FRAGMENT_SHADER, text::kPointFragment, {text::kSampleOutput}}},
+                           {GL_FRAGMENT_SHADER, text::kPointFragment, output}},
                           defines)
-            : makeProgram(
-                  context,
-                  {{GL_VERTEX_SHADER, text::kElementVertex, {text::kRecord}},
-                   {GL_FRAGMENT_SHADER, text::kElementFragment, {text::kRecord, text::kSampleOutput}}},
-                  defines);
+            : makeProgram(context,
+                          {{GL_VERTEX_SHADER, text::kElementVertex, {text::kRecord}},
+                           {GL_FRAGMENT_SHADER,
+                            text::kElementFragment,
+                            {text::kRecord, text::kDecide, text::kSampleCodes, text::kSampleOutput}}},
+                          defines);
     return programs_.emplace(variant, std::move(made)).first->second;
 }
 
-void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size) {
+GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& variant,
+                                        std::vector<ShaderDefine> defines) {
+    namespace text = shaders::raster;
+    const Stage stage = variant.stage;
+    if (stage == Stage::values)
+        return makeProgram(
+            context,
+            {{GL_COMPUTE_SHADER,
+              text::kScanValues,
+              {text::kRecord, text::kDecide, text::kSampleCodes, text::kScanMarks, text::kDecidedPoints}}},
+            defines);
+    if (stage == Stage::elementOrders || stage == Stage::pointOrders) defines.push_back({"ORDERS"});
+    if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
+    defines.push_back({"STEP", std::to_string(1 + int(stage) - int(Stage::contenders1))});
+    defines.push_back({"WORDS", std::to_string(kScanBoxWords) + "u"});
+    const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
+        return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
+    };
+    switch (stage) {
+        case Stage::plan:
+            return made(text::kScanPlan, {text::kScanMarks});
+        case Stage::clear:
+            return made(text::kScanClear, {text::kScanMarks});
+        case Stage::contenders1:
+        case Stage::contenders2:
+        case Stage::contenders3:
+            return made(text::kScanContenders, {text::kScanMarks});
+        case Stage::pointFirst:
+        case Stage::pointOrders:
+        case Stage::pointRanks:
+            return made(text::kScanPoints, {text::kDecide, text::kScanMarks, text::kDecidedPoints});
+        default:
+            return made(text::kScanElements, {text::kRecord, text::kDecide, text::kScanMarks});
+    }
+}
+
+void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size, bool scans) {
     const GLenum format = textureFormat(format_, channels_);
-    const bool fits = target_.format == format && target_.size.x >= size.x && target_.size.y >= size.y &&
-                      target_.size.z >= size.z;
+    const bool fits = target_.format == format && (scans || target_.depth) && target_.size.x >= size.x &&
+                      target_.size.y >= size.y && target_.size.z >= size.z;
     if (fits) return;
     const Vec3i room = target_.format == format ? glm::max(size, target_.size) : size;
     // The old one goes first, for its memory; the new one counts once it is whole.
@@ -122,12 +165,14 @@ void RasterDevice::prepareTarget(GlContext& context, const Vec3i& size) {
     Target made;
     made.size = room;
     made.format = format;
-    made.framebuffer = GlFramebuffer(context);
     made.codes = GlTexture(context, GL_TEXTURE_3D, format, room.x, room.y, room.z);
-    made.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
     if (needsCoverageTexture(format_))
         made.coverage = GlTexture(context, GL_TEXTURE_3D, GL_R8, room.x, room.y, room.z);
-    if (isLayered_) {
+    if (!scans) {
+        made.framebuffer = GlFramebuffer(context);
+        made.depth = GlTexture(context, GL_TEXTURE_2D_ARRAY, GL_DEPTH_COMPONENT32F, room.x, room.y, room.z);
+    }
+    if (!scans && isLayered_) {
         made.framebuffer.attach(GL_COLOR_ATTACHMENT0, made.codes);
         made.framebuffer.attach(GL_DEPTH_ATTACHMENT, made.depth);
         if (made.coverage) made.framebuffer.attach(GL_COLOR_ATTACHMENT1, made.coverage);
@@ -153,7 +198,7 @@ void RasterDevice::clear(GlContext& context) {
 }
 
 void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
-                         std::size_t pass) {
+                         std::size_t pass, bool scans) {
     // Geometry stays where the first pass put it.
     const bool hasGeometry = pass == 0 || isReady_;
     isReady_ = false;
@@ -163,8 +208,8 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
     usedQueries_ = 0;  // of a region that was broken off
     const Vec3i size = region.points.size();
     size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
-    prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0));
-    clear(context);
+    prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0), scans);
+    if (!scans) clear(context);
     if (!region.easy.geometry.empty()) {
         if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
         upload(context, easyChannels_, region.easy.channels[pass]);
@@ -322,23 +367,30 @@ void RasterDevice::drawPublished(GlContext& context, const PublishedList& list) 
     release(context, indices_);
 }
 
-void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
-    if (!isReady_) return;
-    // Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
-    const GlFunctions& gl = context.functions();
+// Time stamps, not GL_TIME_ELAPSED: llvmpipe's first one counts from the machine's start.
+void RasterDevice::startTimer(GlContext& context) {
     if (usedQueries_ == timers_.size())
         timers_.push_back({GlQuery(context, GL_TIMESTAMP), GlQuery(context, GL_TIMESTAMP)});
     if (countsFragments_ && usedQueries_ == fragmentCounters_.size())
         fragmentCounters_.emplace_back(context, kFragmentInvocations);
-    gl.QueryCounter(timers_[usedQueries_][0].id(), GL_TIMESTAMP);
+    context.functions().QueryCounter(timers_[usedQueries_][0].id(), GL_TIMESTAMP);
+}
+
+void RasterDevice::stopTimer(GlContext& context) {
+    context.functions().QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
+    ++usedQueries_;
+}
+
+void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
+    if (!isReady_) return;
+    startTimer(context);
     {
         const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
         drawList(context, batch.easy, false);
         drawList(context, batch.thin, true);
         drawPublished(context, batch.published);
     }
-    gl.QueryCounter(timers_[usedQueries_][1].id(), GL_TIMESTAMP);
-    ++usedQueries_;
+    stopTimer(context);
 }
 
 void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& points) {
@@ -361,6 +413,144 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
                    points.size());
     counts_.vertices += std::int64_t(points.size());
     release(context, vertices_);
+}
+
+void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
+    const GlFunctions& gl = context.functions();
+    const auto clear = [&](const GlBuffer& buffer, std::int64_t bytes) {
+        gl.ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+    };
+    const std::int64_t points = std::int64_t(size_.x) * size_.y * size_.z;
+    if (!marks_ || marks_.bytes() < points * kMarkBytes) {
+        marks_ = GlBuffer();
+        marks_ = GlBuffer(context, points * kMarkBytes, 0);
+        areMarksClear_ = false;
+    }
+    contenderRoom_ = isTight_ ? 1 : std::max<std::int64_t>(points / 2, kLeastContenders);
+    const std::int64_t bytes = (contenderRoom_ + 1) * kContenderBytes;  // the count stands before them
+    if (!contenders_ || contenders_.bytes() < bytes) {
+        contenders_ = GlBuffer();
+        contenders_ = GlBuffer(context, bytes, 0);
+    }
+    const std::int64_t boxBytes = std::int64_t(boxes) * kScanBoxWords * std::int64_t(sizeof(GLuint));
+    if (!coveredPoints_ || coveredPoints_.bytes() < boxBytes) {
+        coveredPoints_ = GlBuffer();
+        coveredPoints_ = GlBuffer(context, boxBytes + boxBytes / 4, 0);
+    }
+    if (!dispatches_) dispatches_ = GlBuffer(context, 15 * sizeof(GLuint), 0);
+    if (!areMarksClear_) clear(marks_, marks_.bytes());
+    clear(contenders_, kContenderBytes);
+    areMarksClear_ = false;
+}
+
+void RasterDevice::bindRecords(GlContext& context) {
+    const auto bind = [&](GLuint binding, const Stream& stream) {
+        context.functions().BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding,
+                                           stream.slots[stream.filled].buffer.id());
+    };
+    bind(0, easyGeometry_);
+    bind(1, easyChannels_);
+    bind(4, thinGeometry_);
+    bind(5, thinChannels_);
+}
+
+const GlProgram& RasterDevice::useScan(GlContext& context, Stage stage, bool isThin) {
+    // Owners don't depend on channels.
+    const GlProgram& used = program(context, {stage, isThin, 1, 0});
+    context.functions().UseProgram(used.id());
+    context.functions().ProgramUniform3ui(used.id(), used.uniform("regionSize"), GLuint(size_.x),
+                                          GLuint(size_.y), GLuint(size_.z));
+    context.functions().ProgramUniform1ui(used.id(), used.uniform("contenderRoom"), GLuint(contenderRoom_));
+    return used;
+}
+
+void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, std::size_t points) {
+    const GlFunctions& gl = context.functions();
+    const std::size_t marks = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
+    const std::size_t counts[4] = {marks, boxes.easyCount, boxes.boxes.size() - boxes.easyCount, points};
+    GLuint groups[4][2];  // x and y for each of these
+    for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t all = (counts[i] + kGroupThreads - 1) / kGroupThreads;
+        const std::size_t rows = std::max<std::size_t>(1, (all + kGroupsARow - 1) / kGroupsARow);
+        groups[i][0] = GLuint((all + rows - 1) / rows);
+        groups[i][1] = GLuint(rows);
+    }
+    const auto dispatch = [&](std::size_t i, bool isAgain) {
+        if (isAgain)
+            gl.DispatchComputeIndirect(GLintptr((i + 1) * 3 * sizeof(GLuint)));
+        else
+            gl.DispatchCompute(groups[i][0], groups[i][1], 1);
+    };
+    const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
+        for (const bool isThin : {false, true}) {
+            const std::size_t i = isThin ? 2 : 1;
+            if (counts[i] == 0) continue;
+            const Stream& geometry = isThin ? thinGeometry_ : easyGeometry_;
+            gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
+            const GlProgram& used = useScan(context, ofElements, isThin);
+            gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(isThin ? boxes.easyCount : 0));
+            gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(counts[i]));
+            dispatch(i, isAgain);
+        }
+        if (points > 0) {
+            const GlProgram& used = useScan(context, ofPoints, false);
+            gl.ProgramUniform1ui(used.id(), used.uniform("pointCount"), GLuint(points));
+            dispatch(3, isAgain);
+        }
+        gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    };
+    // Where bindRecords() puts others: there need not be more than eight.
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, coveredPoints_.id());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
+    noteAll(Stage::elementFirst, Stage::pointFirst, false);
+    const GlProgram& plan = useScan(context, Stage::plan, false);
+    gl.ProgramUniform2uiv(plan.id(), plan.uniform("groupsAgain"), 4, &groups[0][0]);
+    gl.DispatchCompute(1, 1, 1);
+    gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
+    gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, dispatches_.id());
+    for (const Stage stage : {Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
+        useScan(context, stage, false);
+        gl.DispatchComputeIndirect(0);
+        gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    }
+    const GlProgram& clear = useScan(context, Stage::clear, false);
+    gl.ProgramUniform1ui(clear.id(), clear.uniform("markCount"), GLuint(marks));
+    dispatch(0, true);
+    gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    noteAll(Stage::elementOrders, Stage::pointOrders, true);
+    noteAll(Stage::elementRanks, Stage::pointRanks, true);
+}
+
+void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::vector<DecidedPoint>& points,
+                        std::size_t pass, bool isLast) {
+    if (!isReady_) return;
+    const GlFunctions& gl = context.functions();
+    startTimer(context);
+    const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
+    if (pass == 0) prepareScan(context, boxes.boxes.size());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, marks_.id());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, upload(context, indices_, points));
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, contenders_.id());
+    if (pass == 0) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, upload(context, vertices_, boxes.boxes));
+        findOwners(context, boxes, points.size());
+        release(context, vertices_);
+    }
+    bindRecords(context);
+    const GlProgram& used = program(context, {Stage::values, false, channels_, levelsOf(format_)});
+    gl.UseProgram(used.id());
+    gl.ProgramUniform3ui(used.id(), used.uniform("regionSize"), GLuint(size_.x), GLuint(size_.y),
+                         GLuint(size_.z));
+    gl.ProgramUniform1f(used.id(), used.uniform("uncovered"), sampleMarks(format_).uncovered);
+    gl.ProgramUniform1i(used.id(), used.uniform("isLast"), isLast);
+    gl.BindImageTexture(0, target_.codes.id(), 0, GL_TRUE, 0, GL_WRITE_ONLY, target_.format);
+    if (target_.coverage) gl.BindImageTexture(1, target_.coverage.id(), 0, GL_TRUE, 0, GL_WRITE_ONLY, GL_R8);
+    gl.DispatchCompute(GLuint((std::size_t(size_.x) + kGroupThreads - 1) / kGroupThreads), GLuint(size_.y),
+                       GLuint(size_.z));
+    gl.MemoryBarrier(GL_ALL_BARRIER_BITS);
+    stopTimer(context);
+    release(context, indices_);
+    areMarksClear_ = isLast;
 }
 
 void RasterDevice::finishRegion(GlContext& context) {

@@ -12,6 +12,7 @@
 #include "gl/gl_program.h"
 #include "gl/gl_thread.h"
 #include "raster/hard_elements.h"
+#include "raster/point_scan.h"
 #include "raster/prepared_region.h"
 #include "tessera/resampler.h"
 
@@ -41,8 +42,13 @@ class RasterDevice {
     std::mutex exclusive;
 
     /// Clears the target for a region and takes its records. The passes over a region follow one another.
+    /// @param scans the region is scanned, not drawn.
     void begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
-               std::size_t pass = 0);
+               std::size_t pass = 0, bool scans = false);
+    /// Samples the region by compute shaders, layers along z. The boxes and the places of the points are
+    /// those of the first pass.
+    void scan(GlContext& context, const ScanBoxes& boxes, const std::vector<DecidedPoint>& points,
+              std::size_t pass, bool isLast);
     /// Draws what a generator made. Each slice may be drawn by one call only.
     void draw(GlContext& context, const SliceBatch& batch);
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);
@@ -57,9 +63,30 @@ class RasterDevice {
 
     /// Renders layer by layer, as on devices that can't choose a layer in the vertex shader; for tests.
     void forbidVertexShaderLayer() { isLayered_ = false; }
+    /// Scans with room for one contested point, so that all are found the other way; for tests.
+    void allowOneContender() { isTight_ = true; }
 
   private:
-    enum class Stage { sprites, polygons, points, silhouettes, gouraud };
+    enum class Stage {
+        sprites,
+        polygons,
+        points,
+        silhouettes,
+        gouraud,
+        // Of a scan: what elements and decided points note in each of three ways, and the rest.
+        elementFirst,
+        elementOrders,
+        elementRanks,
+        pointFirst,
+        pointOrders,
+        pointRanks,
+        plan,
+        clear,
+        contenders1,
+        contenders2,
+        contenders3,
+        values
+    };
     struct Variant {
         Stage stage;
         bool isThin;
@@ -89,7 +116,15 @@ class RasterDevice {
     };
 
     const GlProgram& program(GlContext& context, const Variant& variant);
-    void prepareTarget(GlContext& context, const Vec3i& size);
+    GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
+    void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
+    void prepareScan(GlContext& context, std::size_t boxes);
+    void findOwners(GlContext& context, const ScanBoxes& boxes, std::size_t points);
+    const GlProgram& useScan(GlContext& context, Stage stage, bool isThin);
+    void bindRecords(GlContext& context);
+    /// Of what is given to the device between them.
+    void startTimer(GlContext& context);
+    void stopTimer(GlContext& context);
     void clear(GlContext& context);
     void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
     void drawPublished(GlContext& context, const PublishedList& list);
@@ -100,8 +135,8 @@ class RasterDevice {
     void drawInParts(GlContext& context, GLenum mode, std::size_t count);
     /// Waits until the device has read what stood there.
     GLuint upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count);
-    template <class T>
-    GLuint upload(GlContext& context, Stream& stream, const std::vector<T>& items) {
+    template <class T, class Memory>
+    GLuint upload(GlContext& context, Stream& stream, const std::vector<T, Memory>& items) {
         return upload(context, stream, items.data(), items.size() * sizeof(T));
     }
     /// Marks that the device has been given all its work on what was last uploaded.
@@ -118,6 +153,12 @@ class RasterDevice {
     Stream vertices_{kOfBatches}, indices_{kOfBatches};
     GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
     GlTexture alphaTexture_;
+    GlBuffer coveredPoints_;       ///< of a scan's boxes
+    GlBuffer marks_, contenders_;  ///< of a scan's points
+    GlBuffer dispatches_;
+    std::int64_t contenderRoom_ = 0;
+    bool isTight_ = false;
+    bool areMarksClear_ = false;  ///< no scan was broken off
     std::vector<std::array<GlQuery, 2>> timers_;
     std::vector<GlQuery> fragmentCounters_;
     std::size_t usedQueries_ = 0;

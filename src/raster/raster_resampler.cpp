@@ -41,6 +41,7 @@ struct RegionJob {
     PreparedRegion prepared;  ///< kept until the device is done
     /// Kept for the passes after the first, when there is room for all of them.
     std::vector<std::shared_ptr<const SliceBatch>> batches;
+    std::shared_ptr<const ScanBoxes> boxes;  ///< in place of primitives where the region is scanned
     std::vector<std::future<void>> draws;
     std::vector<std::future<RasterImage>> images;
 };
@@ -52,6 +53,7 @@ class BoundRaster : public BoundResampler {
         : mesh_(mesh, fields, routed(options, isPublished)),
           format_(options.format),
           isPublished_(isPublished),
+          isScan_(generator == nullptr),
           workBytes_(options.workBytes),
           platform_(platform),
           target_(nameOf(platform)),
@@ -170,6 +172,7 @@ class BoundRaster : public BoundResampler {
     BoundMesh mesh_;
     SampleFormat format_;
     bool isPublished_;
+    bool isScan_;
     std::int64_t workBytes_;
     GlPlatform platform_;
     std::string target_;
@@ -225,7 +228,7 @@ ResampleStatistics BoundRaster::Run::all() {
 void BoundRaster::Run::plan() {
     regions_ = planRasterRegions(boxes_, budget_.regionPoints);
     frame_ = frameNodes(mesh(), lattice_, execution_);
-    axes_ = SliceAxes::along(slots_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
+    axes_ = SliceAxes::along(slots_ || bound_.isScan_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
     binRegions();
     blocks_.resize(boxes_.size());
     partCounts_.assign(boxes_.size(), 0);
@@ -264,7 +267,7 @@ void BoundRaster::Run::start(std::size_t region) {
     statistics_.add(counted::elementSlicePairs, job.prepared.emptyPairs);
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
         job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
-            device_.begin(context, job.prepared, inputs, pass);
+            device_.begin(context, job.prepared, inputs, pass, bound_.isScan_);
         }));
         generate(job, pass);
         if (slots_)
@@ -339,16 +342,21 @@ void BoundRaster::Run::emit(RegionJob& job, std::size_t pass) {
 void BoundRaster::Run::generate(RegionJob& job, std::size_t pass) {
     const Timer timer;
     const RasterInputs inputs = this->inputs();
-    if (job.batches.empty())
+    if (bound_.isScan_)
+        job.boxes = job.boxes ? job.boxes : std::make_shared<const ScanBoxes>(listScanBoxes(job.prepared));
+    else if (job.batches.empty())
         emit(job, pass);
     else
         for (const auto& batch : job.batches) post(job, batch, nullptr);
-    if (!job.prepared.hard.empty()) {
-        auto points = std::make_shared<std::vector<DecidedPoint>>(
-            decideHardElements(inputs, job.prepared, pass, execution_));
-        job.draws.push_back(
-            device_.thread().post([this, points](GlContext& context) { device_.draw(context, *points); }));
-    }
+    auto points = std::make_shared<const std::vector<DecidedPoint>>(
+        decideHardElements(inputs, job.prepared, pass, execution_));
+    job.draws.push_back(device_.thread().post(
+        [this, points, boxes = job.boxes, pass, isLast = pass + 1 == inputs.passCount()](GlContext& context) {
+            if (boxes)
+                device_.scan(context, *boxes, *points, pass, isLast);
+            else
+                device_.draw(context, *points);
+        }));
     statistics_.addMs(stage::generate, timer.elapsedMs());
 }
 
@@ -470,7 +478,7 @@ RasterResampler::RasterResampler(std::string name, std::string description, Meth
                  .description = std::move(description),
                  .isOnDevice = true,
                  .targetsAgree = false,
-                 .meetsContract = method == Method::arithmetic,
+                 .meetsContract = method != Method::published,
                  .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},
                  .spillBoundVoxels = 0x1p-8,
                  .placeBoundVoxels = 0x1p-8}),

@@ -11,8 +11,8 @@
 
 namespace tessera {
 
-/// What the OpenGL resamplers have in common: regions of a lattice are rendered slice by slice into a layered
-/// target and read back. They differ in the primitives that stand for an element in a slice. Runs on
+/// What the OpenGL resamplers have in common: regions of a lattice are rendered slice by slice, or scanned by
+/// compute shaders, into a layered target and read back. They differ in what stands for an element. Runs on
 /// one platform take turns, so a sink must not resample on the platform that feeds it: it would wait for
 /// itself. Slots in textures of sharedGlThread(of its target's platform) are filled without reading back.
 class RasterResampler : public Resampler {
@@ -28,9 +28,10 @@ class RasterResampler : public Resampler {
     /// How the points that an element covers are decided.
     enum class Method {
         arithmetic,  ///< by distances computed in the fragment: meets the contract
+        scan,        ///< the same, by compute shaders that go through the points of each element's box
         published,   ///< as in the paper: 2D alpha textures, Gouraud fill
     };
-    /// @param cost share of what a device usually takes.
+    /// @param generator of primitives; a scan needs none. @param cost share of what a device usually takes.
     RasterResampler(std::string name, std::string description, Method method,
                     std::unique_ptr<const SliceGenerator> generator, double cost = 1);
 

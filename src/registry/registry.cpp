@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "compute/compute_resampler.h"
 #include "hybrid/hybrid_resampler.h"
 #include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
@@ -67,9 +68,11 @@ std::vector<const Resampler*>& registered() {
     static const SoftwareResampler software;
     static const SlicingResampler slicing;
     static const HybridResampler hybrid;
+    static const ComputeResampler compute;
     static const Slicing2001Resampler slicing2001;
     static const Hybrid2001Resampler hybrid2001;
-    static std::vector<const Resampler*> all{&software, &slicing, &hybrid, &slicing2001, &hybrid2001};
+    static std::vector<const Resampler*> all{&software, &slicing,     &hybrid,
+                                             &compute,  &slicing2001, &hybrid2001};
     return all;
 }
 

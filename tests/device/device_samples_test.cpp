@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "compute/compute_resampler.h"
 #include "gl/gl_platform.h"
 #include "gl_test_tools.h"
 #include "hybrid/hybrid_resampler.h"
@@ -143,13 +144,19 @@ class SamplesOnDevice : public DeviceSlotsTest, public testing::WithParamInterfa
 
 TEST_P(SamplesOnDevice, AreThoseThatAreReadBack) {
     TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
-    const auto bound = SlicingResampler().bind(mesh, fields, {"egl-surfaceless", GetParam()});
-    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
-    const auto slots = DeviceSamples::make(thread, boxes, codingsOf(mesh, fields, GetParam()), GetParam());
-    ASSERT_EQ(slots->groupCount(), 2u);
-    const ResampleStatistics statistics = bound->resampleToDevice(lattice, boxes, *slots, {});
-    EXPECT_EQ(statistics.count(counted::readBackBytes), 0);
-    expectBlocks(*slots, blocksBy(*bound), 0);
+    const SlicingResampler slicing;
+    const ComputeResampler compute;
+    for (const Resampler* resampler :
+         {static_cast<const Resampler*>(&slicing), static_cast<const Resampler*>(&compute)}) {
+        const auto bound = resampler->bind(mesh, fields, {"egl-surfaceless", GetParam()});
+        GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+        const auto slots =
+            DeviceSamples::make(thread, boxes, codingsOf(mesh, fields, GetParam()), GetParam());
+        ASSERT_EQ(slots->groupCount(), 2u);
+        const ResampleStatistics statistics = bound->resampleToDevice(lattice, boxes, *slots, {});
+        EXPECT_EQ(statistics.count(counted::readBackBytes), 0);
+        expectBlocks(*slots, blocksBy(*bound), 0);
+    }
 }
 
 TEST_P(SamplesOnDevice, AreUploadedByAlgorithmsOnTheProcessor) {

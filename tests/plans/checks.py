@@ -8,8 +8,8 @@ from plans.oracle import Reconstruction, keys_of
 from plans.places import PlaceChecker
 from plans.vdb_reader import turn
 
-SPILL = {"software": 2.0**-12, "slicing": 2.0**-8, "hybrid": 2.0**-8}
-PLACE = {"software": 2.0**-24, "slicing": 2.0**-8, "hybrid": 2.0**-8}
+SPILL = {"software": 2.0**-12, "slicing": 2.0**-8, "hybrid": 2.0**-8, "compute": 2.0**-8}
+PLACE = {"software": 2.0**-24, "slicing": 2.0**-8, "hybrid": 2.0**-8, "compute": 2.0**-8}
 
 
 class Kept:

@@ -22,7 +22,7 @@ using namespace rastertest;
 
 constexpr SampleFormat kFormats[] = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16,
                                      SampleFormat::r8};
-constexpr std::string_view kAlgorithms[] = {"slicing", "hybrid"};
+constexpr std::string_view kAlgorithms[] = {"slicing", "hybrid", "compute"};
 
 BindOptions on(GlPlatform platform, SampleFormat format = SampleFormat::r32f) {
     BindOptions options;
@@ -62,11 +62,11 @@ TEST_P(RasterRuns, AThousandLeakNeitherObjectsNorMemory) {
     const IndexBox box = centredBox(8);
     const Lattice lattice = centredLattice(8);
     const auto run = [&](int i) {
-        const auto sampled = sampleOnce(kAlgorithms[i % 2], mesh, i % 3 ? one : all,
+        const auto sampled = sampleOnce(kAlgorithms[i / 3 % 3], mesh, i % 3 ? one : all,
                                         on(GetParam(), kFormats[i / 2 % 4]), lattice, std::span(&box, 1));
         ASSERT_GT(sampled.statistics.count(counted::coveredPoints), 400);
     };
-    constexpr int kRuns = 1000, kWarmUp = 48;
+    constexpr int kRuns = 1000, kWarmUp = 96;
     for (int i = 0; i < kWarmUp; ++i) run(i);
     const std::int64_t objects = liveObjects(GetParam());
     const std::int64_t bytes = residentBytes();
@@ -84,7 +84,7 @@ TEST_P(RasterRuns, AThousandBindingsLeakNothing) {
     std::int64_t objects = 0, bytes = 0;
     for (int i = 0; i < 1048; ++i) {
         if (i == 48) objects = liveObjects(GetParam()), bytes = residentBytes();
-        const auto bound = namedResampler(kAlgorithms[i % 2]).bind(mesh, all, on(GetParam()));
+        const auto bound = namedResampler(kAlgorithms[i % 3]).bind(mesh, all, on(GetParam()));
         ASSERT_EQ(bound->target(), nameOf(GetParam()));
     }
     EXPECT_EQ(liveObjects(GetParam()), objects);
@@ -140,8 +140,9 @@ void compareAtOnce(const std::vector<std::pair<std::string_view, GlPlatform>>& r
         EXPECT_EQ(threads[t].get(), 0) << runners[t].first << " on " << nameOf(runners[t].second);
 }
 
-TEST_P(RasterRuns, BothAlgorithmsRunAtOnceOnOneDevice) {
-    compareAtOnce({{"slicing", GetParam()}, {"hybrid", GetParam()}, {"slicing", GetParam()}});
+TEST_P(RasterRuns, AlgorithmsRunAtOnceOnOneDevice) {
+    compareAtOnce(
+        {{"slicing", GetParam()}, {"hybrid", GetParam()}, {"compute", GetParam()}, {"slicing", GetParam()}});
 }
 
 TEST(RasterRunsOnTwoPlatforms, GiveTheSameBitsAsAlone) {
@@ -150,7 +151,8 @@ TEST(RasterRunsOnTwoPlatforms, GiveTheSameBitsAsAlone) {
     compareAtOnce({{"slicing", GlPlatform::eglSurfaceless},
                    {"slicing", GlPlatform::osmesa},
                    {"hybrid", GlPlatform::eglSurfaceless},
-                   {"hybrid", GlPlatform::osmesa}});
+                   {"compute", GlPlatform::eglSurfaceless},
+                   {"compute", GlPlatform::osmesa}});
 }
 
 /// Renders one region by hand, as a run does.
@@ -226,6 +228,68 @@ TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
                               1000);
                 }
             }
+}
+
+/// Samples one region by the scan, as a run does.
+RasterImage scan(RasterDevice& device, const RasterInputs& inputs, const IndexBox& points) {
+    std::vector<std::int32_t> elements(inputs.mesh.tets.size());
+    std::iota(elements.begin(), elements.end(), 0);
+    const PreparedRegion region = prepareRegion(inputs, points, elements, {});
+    const ScanBoxes boxes = listScanBoxes(region);
+    const auto decided = decideHardElements(inputs, region, 0, {});
+    return device.thread().run([&](GlContext& context) {
+        device.begin(context, region, inputs, 0, true);
+        device.scan(context, boxes, decided, 0, true);
+        return device.readBack(context);
+    });
+}
+
+/// Elements of all grades; sides that lie on lattice planes and nodes on lattice points, where up to 24
+/// elements are equally deep; one as large as the region, whose box is cut.
+TetMesh contestedMesh() {
+    TetMesh mesh = boxMesh({.cells = Vec3i(4)});
+    mesh.fields.clear();
+    appendMesh(mesh, boxMesh({.cells = Vec3i(3), .jitter = 0.25, .seed = 3}));
+    appendMesh(mesh, thinTetsMesh(ThinKind::sliver, 1e-5, 0.7, 20, 3));
+    appendMesh(mesh, thinTetsMesh(ThinKind::needle, 1e-9, 0.7, 20, 4));
+    const auto first = std::int32_t(mesh.points.size());
+    for (const Vec3d& point : {Vec3d(0, 0, 0), Vec3d(1, 0.1, 0), Vec3d(0.2, 1, 0.1), Vec3d(0, 0.1, 1)})
+        mesh.points.push_back(point);
+    mesh.tets.push_back({first, first + 1, first + 2, first + 3});
+    addPointField(mesh, "wavy", {wavyField});
+    addRandomField(mesh, "vector", FieldLocation::point, 3, 0, 1, 5);
+    addHoledCopy(mesh, 0, "holed", 5);
+    return mesh;
+}
+
+TEST_P(RasterRuns, AScanGivesTheBitsOfADrawing) {
+    const TetMesh mesh = contestedMesh();
+    const int points = 33;  // every eighth lies on a node's plane
+    const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel(Vec3d(0), 1.0 / (points - 1)), {});
+    const std::shared_ptr<RasterDevice> drawing = makeDevice(GetParam()), scanning = makeDevice(GetParam()),
+                                        tight = makeDevice(GetParam());
+    tight->allowOneContender();
+    const SilhouetteGenerator silhouettes;
+    for (const SampleFormat format : kFormats)
+        for (const std::vector<std::pair<std::size_t, int>>& channels :
+             {std::vector<std::pair<std::size_t, int>>{{2, 0}}, {{0, 0}, {1, 0}, {1, 2}}, {}}) {
+            std::vector<ChannelCoding> codings;
+            for (const auto& [field, component] : channels)
+                codings.emplace_back(mesh.fields[field], component, format);
+            const RasterInputs inputs{mesh, frame, codings, format, SliceAxes::along(2)};
+            const IndexBox box{{-2, 1, 0}, {points, points + 1, points - 5}};
+            const RasterImage drawn = render(*drawing, inputs, box, silhouettes);
+            for (RasterDevice* device : {scanning.get(), tight.get(), scanning.get()}) {
+                const RasterImage scanned = scan(*device, inputs, box);
+                EXPECT_EQ(scanned.coverage, drawn.coverage);
+                ASSERT_EQ(scanned.codes.size(), drawn.codes.size());
+                EXPECT_EQ(
+                    std::memcmp(scanned.codes.data(), drawn.codes.data(), drawn.codes.size() * sizeof(float)),
+                    0)
+                    << nameOf(format) << ", " << channels.size() << " channels"
+                    << (device == tight.get() ? ", without a list" : "");
+            }
+        }
 }
 
 TEST_P(RasterRuns, ADrawThatFailsHalfWayLeavesTheDeviceUsable) {

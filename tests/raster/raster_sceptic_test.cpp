@@ -342,7 +342,7 @@ TEST_P(RasterSceptic, BadRequestsAreRefusedAndForgotten) {
     EXPECT_EQ(differences(sample(mesh, fields, centredLattice(8), std::span(&box, 1)), before), 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(Algorithms, RasterSceptic, testing::Values("slicing", "hybrid"),
+INSTANTIATE_TEST_SUITE_P(Algorithms, RasterSceptic, testing::Values("slicing", "hybrid", "compute"),
                          [](const testing::TestParamInfo<std::string_view>& param) {
                              return std::string(param.param);
                          });

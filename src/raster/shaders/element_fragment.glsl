@@ -1,5 +1,4 @@
-// Decides by the distances to the four faces whether the element covers this lattice point. The operations
-// and their order are the same for every axis, region and number of channels, and so are the bits.
+// Decides by the distances to the four faces whether the element covers this lattice point.
 uniform int layerAxis;
 
 #ifdef THIN
@@ -23,15 +22,12 @@ void main() {
                        : layerAxis == 1 ? vec3(0, layerPlace, 0)
                                         : vec3(layerPlace, 0, 0);
     vec3 place = across(gl_FragCoord.xy - 0.5) + alongLayers - geometry.base.xyz;
-    precise dvec4 distances = geometry.nx * double(place.x) + geometry.ny * double(place.y) +
-                              geometry.nz * double(place.z) + geometry.offset;
-    double least = min(min(distances.x, distances.y), min(distances.z, distances.w));
+    double least = depthAt(geometry.nx, geometry.ny, geometry.nz, geometry.offset, place);
     if (least < -double(geometry.base.w)) discard;
     float depth = float(least);
 #else
     vec3 place = across(gl_FragCoord.xy) + shift.xyz;
-    precise vec4 distances = nx * place.x + ny * place.y + nz * place.z + offset;
-    float depth = min(min(distances.x, distances.y), min(distances.z, distances.w));
+    float depth = depthAt(nx, ny, nz, offset, place);
     if (depth < -shift.w) discard;
 #endif
     float sampled[CHANNELS];
@@ -43,9 +39,7 @@ void main() {
         vec4 slope = gradient[c];
         vec4 value = values[c];
 #endif
-        precise float rise = slope.x * place.x + slope.y * place.y + slope.z * place.z + slope.w;
-        precise float sum = value.x + rise;
-        sampled[c] = clamp(sum, value.y, value.z);
+        sampled[c] = codeAt(slope, value, place);
     }
-    writeSample(sampled, 0.5 + depth * DEPTH_SCALE);
+    writeSample(sampled, orderOf(depth));
 }

@@ -4,5 +4,5 @@ flat in vec4 given;
 void main() {
     float sampled[CHANNELS];
     for (int c = 0; c < CHANNELS; ++c) sampled[c] = given[c];
-    writeSample(sampled, 0.5 + depth * DEPTH_SCALE);
+    writeSample(sampled, orderOf(depth));
 }
