@@ -22,7 +22,7 @@ constexpr const char* kDepthScale = "1.220703125e-4";
 /// Of a scan: threads of a workgroup, workgroups along one axis of a dispatch, and bytes of what it notes.
 constexpr std::size_t kGroupThreads = 64;
 constexpr std::size_t kGroupsARow = 32768;
-constexpr std::int64_t kMarkBytes = 8, kContenderBytes = 16, kLeastContenders = 1 << 16;
+constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
 /// corners.
 constexpr std::size_t kVerticesAtOnce = std::size_t(3) << 14;
@@ -123,15 +123,15 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
     namespace text = shaders::raster;
     const Stage stage = variant.stage;
     if (stage == Stage::values)
-        return makeProgram(
-            context,
-            {{GL_COMPUTE_SHADER,
-              text::kScanValues,
-              {text::kRecord, text::kDecide, text::kSampleCodes, text::kScanMarks, text::kDecidedPoints}}},
-            defines);
+        return makeProgram(context,
+                           {{GL_COMPUTE_SHADER,
+                             text::kScanValues,
+                             {text::kRecord, text::kThinRecord, text::kDecide, text::kSampleCodes,
+                              text::kScanMarks, text::kDecidedPoints}}},
+                           defines);
     if (stage == Stage::elementOrders || stage == Stage::pointOrders) defines.push_back({"ORDERS"});
     if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
-    defines.push_back({"STEP", std::to_string(1 + int(stage) - int(Stage::contenders1))});
+    defines.push_back({"STEP", std::to_string(int(stage) - int(Stage::contenders0))});
     defines.push_back({"WORDS", std::to_string(kScanBoxWords) + "u"});
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
         return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
@@ -141,10 +141,12 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
             return made(text::kScanPlan, {text::kScanMarks});
         case Stage::clear:
             return made(text::kScanClear, {text::kScanMarks});
+        case Stage::contenders0:
         case Stage::contenders1:
         case Stage::contenders2:
         case Stage::contenders3:
-            return made(text::kScanContenders, {text::kScanMarks});
+            return made(text::kScanContenders, {text::kRecord, text::kThinRecord, text::kDecide,
+                                                text::kScanMarks, text::kDecidedPoints});
         case Stage::pointFirst:
         case Stage::pointOrders:
         case Stage::pointRanks:
@@ -421,10 +423,12 @@ void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
         gl.ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
     };
     const std::int64_t points = std::int64_t(size_.x) * size_.y * size_.z;
-    if (!marks_ || marks_.bytes() < points * kMarkBytes) {
-        marks_ = GlBuffer();
-        marks_ = GlBuffer(context, points * kMarkBytes, 0);
-        areMarksClear_ = false;
+    if (!owners_ || owners_.bytes() < points * kOwnerBytes) {
+        owners_.reset();
+        orders_.reset();
+        owners_ = GlBuffer(context, points * kOwnerBytes, 0);
+        orders_ = GlBuffer(context, points * kOwnerBytes, 0);
+        areOwnersClear_ = false;
     }
     contenderRoom_ = isTight_ ? 1 : std::max<std::int64_t>(points / 2, kLeastContenders);
     const std::int64_t bytes = (contenderRoom_ + 1) * kContenderBytes;  // the count stands before them
@@ -438,9 +442,9 @@ void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
         coveredPoints_ = GlBuffer(context, boxBytes + boxBytes / 4, 0);
     }
     if (!dispatches_) dispatches_ = GlBuffer(context, 15 * sizeof(GLuint), 0);
-    if (!areMarksClear_) clear(marks_, marks_.bytes());
+    if (!areOwnersClear_) clear(owners_, owners_.bytes());
     clear(contenders_, kContenderBytes);
-    areMarksClear_ = false;
+    areOwnersClear_ = false;
 }
 
 void RasterDevice::bindRecords(GlContext& context) {
@@ -464,15 +468,16 @@ const GlProgram& RasterDevice::useScan(GlContext& context, Stage stage, bool isT
     return used;
 }
 
-void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, std::size_t points) {
+void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer,
+                              std::size_t points) {
     const GlFunctions& gl = context.functions();
-    const std::size_t marks = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
-    const std::size_t counts[4] = {marks, boxes.easyCount, boxes.boxes.size() - boxes.easyCount, points};
+    const std::size_t all = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
+    const std::size_t counts[4] = {all, boxes.easyCount, boxes.boxes.size() - boxes.easyCount, points};
     GLuint groups[4][2];  // x and y for each of these
     for (std::size_t i = 0; i < 4; ++i) {
-        const std::size_t all = (counts[i] + kGroupThreads - 1) / kGroupThreads;
-        const std::size_t rows = std::max<std::size_t>(1, (all + kGroupsARow - 1) / kGroupsARow);
-        groups[i][0] = GLuint((all + rows - 1) / rows);
+        const std::size_t wanted = (counts[i] + kGroupThreads - 1) / kGroupThreads;
+        const std::size_t rows = std::max<std::size_t>(1, (wanted + kGroupsARow - 1) / kGroupsARow);
+        groups[i][0] = GLuint((wanted + rows - 1) / rows);
         groups[i][1] = GLuint(rows);
     }
     const auto dispatch = [&](std::size_t i, bool isAgain) {
@@ -481,7 +486,10 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, std::s
         else
             gl.DispatchCompute(groups[i][0], groups[i][1], 1);
     };
+    // Buffers change places: there need not be more than eight.
     const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, coveredPoints_.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, boxBuffer);
         for (const bool isThin : {false, true}) {
             const std::size_t i = isThin ? 2 : 1;
             if (counts[i] == 0) continue;
@@ -499,22 +507,22 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, std::s
         }
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     };
-    // Where bindRecords() puts others: there need not be more than eight.
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, coveredPoints_.id());
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
     noteAll(Stage::elementFirst, Stage::pointFirst, false);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
     const GlProgram& plan = useScan(context, Stage::plan, false);
     gl.ProgramUniform2uiv(plan.id(), plan.uniform("groupsAgain"), 4, &groups[0][0]);
     gl.DispatchCompute(1, 1, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
     gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, dispatches_.id());
-    for (const Stage stage : {Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
+    bindRecords(context);
+    for (const Stage stage :
+         {Stage::contenders0, Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
         useScan(context, stage, false);
         gl.DispatchComputeIndirect(0);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
     const GlProgram& clear = useScan(context, Stage::clear, false);
-    gl.ProgramUniform1ui(clear.id(), clear.uniform("markCount"), GLuint(marks));
+    gl.ProgramUniform1ui(clear.id(), clear.uniform("pointCount"), GLuint(all));
     dispatch(0, true);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     noteAll(Stage::elementOrders, Stage::pointOrders, true);
@@ -528,12 +536,12 @@ void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::v
     startTimer(context);
     const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
     if (pass == 0) prepareScan(context, boxes.boxes.size());
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, marks_.id());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, orders_.id());
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, owners_.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, upload(context, indices_, points));
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, contenders_.id());
     if (pass == 0) {
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, upload(context, vertices_, boxes.boxes));
-        findOwners(context, boxes, points.size());
+        findOwners(context, boxes, upload(context, vertices_, boxes.boxes), points.size());
         release(context, vertices_);
     }
     bindRecords(context);
@@ -550,7 +558,7 @@ void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::v
     gl.MemoryBarrier(GL_ALL_BARRIER_BITS);
     stopTimer(context);
     release(context, indices_);
-    areMarksClear_ = isLast;
+    areOwnersClear_ = isLast;
 }
 
 void RasterDevice::finishRegion(GlContext& context) {

@@ -82,6 +82,7 @@ class RasterDevice {
         pointRanks,
         plan,
         clear,
+        contenders0,
         contenders1,
         contenders2,
         contenders3,
@@ -119,7 +120,7 @@ class RasterDevice {
     GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
     void prepareScan(GlContext& context, std::size_t boxes);
-    void findOwners(GlContext& context, const ScanBoxes& boxes, std::size_t points);
+    void findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer, std::size_t points);
     const GlProgram& useScan(GlContext& context, Stage stage, bool isThin);
     void bindRecords(GlContext& context);
     /// Of what is given to the device between them.
@@ -153,12 +154,12 @@ class RasterDevice {
     Stream vertices_{kOfBatches}, indices_{kOfBatches};
     GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
     GlTexture alphaTexture_;
-    GlBuffer coveredPoints_;       ///< of a scan's boxes
-    GlBuffer marks_, contenders_;  ///< of a scan's points
+    GlBuffer coveredPoints_;                 ///< of a scan's boxes
+    GlBuffer owners_, orders_, contenders_;  ///< of a scan's points
     GlBuffer dispatches_;
     std::int64_t contenderRoom_ = 0;
     bool isTight_ = false;
-    bool areMarksClear_ = false;  ///< no scan was broken off
+    bool areOwnersClear_ = false;  ///< no scan was broken off
     std::vector<std::array<GlQuery, 2>> timers_;
     std::vector<GlQuery> fragmentCounters_;
     std::size_t usedQueries_ = 0;

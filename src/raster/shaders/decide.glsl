@@ -1,17 +1,14 @@
 // The operations by which every shader decides and samples, in one order: the same bits everywhere.
 
 // The least distance of a place to the four faces, in voxels.
-#ifdef THIN
 double depthAt(dvec4 nx, dvec4 ny, dvec4 nz, dvec4 offset, vec3 place) {
     precise dvec4 distances = nx * double(place.x) + ny * double(place.y) + nz * double(place.z) + offset;
     return min(min(distances.x, distances.y), min(distances.z, distances.w));
 }
-#else
 float depthAt(vec4 nx, vec4 ny, vec4 nz, vec4 offset, vec3 place) {
     precise vec4 distances = nx * place.x + ny * place.y + nz * place.z + offset;
     return min(min(distances.x, distances.y), min(distances.z, distances.w));
 }
-#endif
 
 // Of two elements the one with the larger number owns a point.
 float orderOf(float depth) {

@@ -5,7 +5,7 @@ struct Box {
     uint rank;
     uint low, last;  // points of the region, 8 bits an axis
 };
-layout(std430, binding = 2) readonly buffer Boxes {
+layout(std430, binding = 5) readonly buffer Boxes {
     Box boxes[];
 };
 // WORDS of 32 points a box, which the first way leaves for the others.
@@ -54,18 +54,19 @@ void main() {
         uint contested = 0u;
         for (uint left = covered; left != 0u; left &= left - 1u) {
             uvec3 point = low + placeInBox(first + uint(findLSB(left)), size, ofRow, ofLayer);
-            float order = orderOf(float(depthIn(geometry, point)));
 #if defined(ORDERS)
-            noteOrder(markOf(point), order);
+            noteOrder(placeOf(point), orderOf(float(depthIn(geometry, point))));
 #elif defined(RANKS)
-            noteRank(markOf(point), order, box.rank);
+            noteRank(placeOf(point), orderOf(float(depthIn(geometry, point))), box.rank);
 #else
-            if (!takeFirst(markOf(point), order, box.rank)) contested |= left & -left;
+            if (takeFirst(placeOf(point), box.rank) != 0u) contested |= left & -left;
 #endif
         }
         for (; contested != 0u; contested &= contested - 1u) {
             uvec3 point = low + placeInBox(first + uint(findLSB(contested)), size, ofRow, ofLayer);
-            contend(markOf(point), orderOf(float(depthIn(geometry, point))), box.rank);
+            // Whoever came first stays until all have come.
+            contend(placeOf(point), orderOf(float(depthIn(geometry, point))), box.rank,
+                    atomicOr(owners[placeOf(point)], 0u));
         }
     }
 }

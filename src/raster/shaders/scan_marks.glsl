@@ -1,16 +1,17 @@
-// What a scan notes of a point of the region: the greatest order, and of those that have it the least rank, as
-// its complement. 0, 0: no element covers it.
-struct Mark {
-    uint order, rank;
+// The owner of a point of the region, as the complement of its rank. 0: no element covers it.
+layout(std430, binding = 3) buffer Owners {
+    uint owners[];
 };
-layout(std430, binding = 3) buffer Marks {
-    Mark marks[];
+// The greatest order at a point, where several elements cover it.
+layout(std430, binding = 2) buffer Orders {
+    uint orders[];
 };
 uniform uvec3 regionSize;
 
-// Those who come to a point that has an owner already; `firstOrder` is that of the first who came.
+// Those who come to a point that has an owner already, and the complement of that one's rank or, later, its
+// order.
 struct Contender {
-    uint at, order, rank, firstOrder;
+    uint at, order, rank, first;
 };
 layout(std430, binding = 7) buffer Contenders {
     uint contenderCount;  // may be more than there is room for
@@ -23,26 +24,23 @@ uniform uint contenderRoom;
 const uint kKindShift = 28u;
 const uint kPlaceMask = (1u << kKindShift) - 1u;
 
-uint markOf(uvec3 point) {
+uint placeOf(uvec3 point) {
     return (point.z * regionSize.y + point.y) * regionSize.x + point.x;
 }
 
-// The first to come owns a point; false for others, who contend for it.
-bool takeFirst(uint at, float order, uint rank) {
-    bool isFirst = atomicCompSwap(marks[at].order, 0u, floatBitsToUint(order)) == 0u;
-    if (isFirst) marks[at].rank = ~rank;
-    return isFirst;
+// Gives 0 to the first to come, who owns the point; to others, who contend for it, that one's complement.
+uint takeFirst(uint at, uint rank) {
+    return atomicCompSwap(owners[at], 0u, ~rank);
 }
-void contend(uint at, float order, uint rank) {
+void contend(uint at, float order, uint rank, uint first) {
     if (contenderCount > contenderRoom) return;  // nor may the count come round
     uint slot = atomicAdd(contenderCount, 1u);
-    if (slot < contenderRoom)
-        contenders[slot] = Contender(at, floatBitsToUint(order), rank, marks[at].order);
+    if (slot < contenderRoom) contenders[slot] = Contender(at, floatBitsToUint(order), rank, first);
 }
 // The way that needs no list: the greatest orders of all, then the least ranks.
 void noteOrder(uint at, float order) {
-    atomicMax(marks[at].order, floatBitsToUint(order));
+    atomicMax(orders[at], floatBitsToUint(order));
 }
 void noteRank(uint at, float order, uint rank) {
-    if (marks[at].order == floatBitsToUint(order)) atomicMax(marks[at].rank, ~rank);
+    if (orders[at] == floatBitsToUint(order)) atomicMax(owners[at], ~rank);
 }

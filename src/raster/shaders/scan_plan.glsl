@@ -3,7 +3,7 @@
 layout(local_size_x = 1) in;
 
 layout(std430, binding = 5) writeonly buffer Dispatches {
-    uint groups[15];  // x, y, z: of contenders, marks, easy elements, thin ones, decided points
+    uint groups[15];  // x, y, z: of contenders, points, easy elements, thin ones, decided points
 };
 uniform uvec2 groupsAgain[4];  // x, y of the last four
 

@@ -8,13 +8,14 @@ void main() {
                  gl_LocalInvocationIndex;
     if (index >= pointCount) return;
     DecidedPoint point = decided[index];
-    uint at = markOf(uvec3(point.place & 0xffffu, point.place >> 16, point.layer));
+    uint at = placeOf(uvec3(point.place & 0xffffu, point.place >> 16, point.layer));
     float order = orderOf(point.depth);
 #if defined(ORDERS)
     noteOrder(at, order);
 #elif defined(RANKS)
     noteRank(at, order, kDecided | index);
 #else
-    if (!takeFirst(at, order, kDecided | index)) contend(at, order, kDecided | index);
+    uint first = takeFirst(at, kDecided | index);
+    if (first != 0u) contend(at, order, kDecided | index, first);
 #endif
 }

@@ -1,14 +1,6 @@
-// A thread for each point of the region writes what its owner says. Marks are left as a scan wants them when
-// no pass follows.
+// A thread for each point of the region writes what its owner says, and forgets the owner when no pass follows.
 layout(local_size_x = 64) in;
 
-struct ThinGeometry {
-    dvec4 nx, ny, nz, offset;
-    vec4 base;
-};
-layout(std430, binding = 4) readonly buffer ThinGeometries {
-    ThinGeometry thinGeometries[];
-};
 layout(std430, binding = 5) readonly buffer ThinChannels {
     Channel thinChannels[];
 };
@@ -22,19 +14,18 @@ uniform bool isLast;
 void main() {
     uvec3 point = gl_GlobalInvocationID;
     if (point.x >= regionSize.x) return;
-    uint at = markOf(point);
-    uint rank = ~marks[at].rank;
-    bool isCovered = marks[at].order != 0u;
-    if (isLast) marks[at] = Mark(0u, 0u);
+    uint at = placeOf(point);
+    uint owner = owners[at];
+    if (isLast) owners[at] = 0u;
     ivec3 texel = ivec3(point);
-    if (!isCovered) {
+    if (owner == 0u) {
         imageStore(codes, texel, vec4(uncovered));
 #ifdef LEVELS
         imageStore(coverage, texel, vec4(0));
 #endif
         return;
     }
-    uint kind = rank >> kKindShift, item = rank & kPlaceMask;
+    uint kind = ~owner >> kKindShift, item = ~owner & kPlaceMask;
     float sampled[CHANNELS];
     if (kind < 2u) {
         vec3 place = vec3(point) - geometries[item].base.xyz;
