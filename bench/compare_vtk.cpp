@@ -114,7 +114,7 @@ int main(int count, char** words) {
     Options options;
     tessera::bench::Arguments arguments("Times Tessera against vtkResampleToImage.");
     arguments.addNeeded("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py");
-    arguments.add("--algorithms", options.algorithms, "software, slicing, hybrid");
+    arguments.add("--algorithms", options.algorithms, "software, slicing, hybrid, compute");
     arguments.add("--csv", options.csvPath, "also write the figures here");
     arguments.add("--points", options.sizes, "lattice points along an axis");
     arguments.add("--runs", options.runs, "", {1, 1000});
