@@ -299,14 +299,11 @@ void walk(const ScanInput& input, const ScanOutput& output, std::int32_t element
                 point[t] = int(std::int64_t(e.base[t]) + std::int64_t(atT));
                 point[r] = int(std::int64_t(e.base[r]) + std::int64_t(atR));
                 const std::int64_t offset = output.offset(point);
-                if (output.marks[offset] == kNotCovered) {
-                    output.marks[offset] = kStartsRun;
-                    output.owner[offset] = element;
-                } else {
-                    ++counts.contested;
+                const bool takes = coverPoint(input, output, element, offset, counts, [&] {
                     if (!depth) depth.emplace(input.mesh, input.frame, element);
-                    if (!contestPoint(input, output, element, depth->rank(point), offset)) continue;
-                }
+                    return depth->rank(point);
+                });
+                if (!takes) continue;
                 for (std::size_t c = 0; c < channels.size(); ++c)
                     output.values[c][offset] = channels[c].at(first[c], atS - begin);
             }

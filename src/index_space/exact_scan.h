@@ -73,6 +73,20 @@ struct ScanCounts {
 bool contestPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, double rank,
                   std::int64_t offset);
 
+/// Takes note that `element` covers a point. True when the point takes the element's values.
+/// @param rank gives the element's rank there, where that is needed.
+template <class Rank>
+bool coverPoint(const ScanInput& input, const ScanOutput& output, std::int32_t element, std::int64_t offset,
+                ScanCounts& counts, const Rank& rank) {
+    if (output.marks[offset] == kNotCovered) {
+        output.marks[offset] = kStartsRun;
+        output.owner[offset] = element;
+        return true;
+    }
+    ++counts.contested;
+    return contestPoint(input, output, element, rank(), offset);
+}
+
 /// Samples one element in 113-bit arithmetic or, where that isn't enough, in rationals.
 void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::int32_t element,
                         ScanCounts& counts);

@@ -77,8 +77,9 @@ std::vector<DecidedPoint> decideCell(const RasterInputs& inputs, std::span<const
         if (marks[i] == kNotCovered) continue;
         const Vec3i at = output.pointAt(std::int64_t(i));
         const Vec3i pixel = at - region.min;
-        if (const std::int32_t of = output.ownerAt(std::int64_t(i)); of != lastOwner) {
-            lastOwner = of;
+        // What follows in a run has the owner of the point before it.
+        if (marks[i] == kStartsRun && (owner[i] & kElementMask) != lastOwner) {
+            lastOwner = owner[i] & kElementMask;
             depth.emplace(inputs.mesh, inputs.frame, lastOwner);
         }
         DecidedPoint point{std::uint16_t(pixel[inputs.axes.s]),

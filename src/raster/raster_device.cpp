@@ -122,17 +122,13 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
                                         std::vector<ShaderDefine> defines) {
     namespace text = shaders::raster;
     const Stage stage = variant.stage;
-    if (stage == Stage::values)
-        return makeProgram(context,
-                           {{GL_COMPUTE_SHADER,
-                             text::kScanValues,
-                             {text::kRecord, text::kThinRecord, text::kDecide, text::kSampleCodes,
-                              text::kScanMarks, text::kDecidedPoints}}},
-                           defines);
     if (stage == Stage::elementOrders || stage == Stage::pointOrders) defines.push_back({"ORDERS"});
     if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
     defines.push_back({"STEP", std::to_string(int(stage) - int(Stage::contenders0))});
-    defines.push_back({"WORDS", std::to_string(kScanBoxWords) + "u"});
+    for (const auto& [name, value] :
+         {std::pair("WORDS", std::size_t(kScanBoxWords)), std::pair("GROUP_THREADS", kGroupThreads),
+          std::pair("GROUPS_A_ROW", kGroupsARow)})
+        defines.push_back({name, std::to_string(value) + "u"});
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
         return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
     };
@@ -147,6 +143,9 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
         case Stage::contenders3:
             return made(text::kScanContenders, {text::kRecord, text::kThinRecord, text::kDecide,
                                                 text::kScanMarks, text::kDecidedPoints});
+        case Stage::values:
+            return made(text::kScanValues, {text::kRecord, text::kThinRecord, text::kDecide,
+                                            text::kSampleCodes, text::kScanMarks, text::kDecidedPoints});
         case Stage::pointFirst:
         case Stage::pointOrders:
         case Stage::pointRanks:
@@ -458,9 +457,8 @@ void RasterDevice::bindRecords(GlContext& context) {
     bind(5, thinChannels_);
 }
 
-const GlProgram& RasterDevice::useScan(GlContext& context, Stage stage, bool isThin) {
-    // Owners don't depend on channels.
-    const GlProgram& used = program(context, {stage, isThin, 1, 0});
+const GlProgram& RasterDevice::useScan(GlContext& context, const Variant& variant) {
+    const GlProgram& used = program(context, variant);
     context.functions().UseProgram(used.id());
     context.functions().ProgramUniform3ui(used.id(), used.uniform("regionSize"), GLuint(size_.x),
                                           GLuint(size_.y), GLuint(size_.z));
@@ -486,6 +484,10 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
         else
             gl.DispatchCompute(groups[i][0], groups[i][1], 1);
     };
+    // Owners don't depend on channels.
+    const auto use = [&](Stage stage, bool isThin = false) -> const GlProgram& {
+        return useScan(context, {stage, isThin, 1, 0});
+    };
     // Buffers change places: there need not be more than eight.
     const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
         gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, coveredPoints_.id());
@@ -495,13 +497,13 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
             if (counts[i] == 0) continue;
             const Stream& geometry = isThin ? thinGeometry_ : easyGeometry_;
             gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
-            const GlProgram& used = useScan(context, ofElements, isThin);
+            const GlProgram& used = use(ofElements, isThin);
             gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(isThin ? boxes.easyCount : 0));
             gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(counts[i]));
             dispatch(i, isAgain);
         }
         if (points > 0) {
-            const GlProgram& used = useScan(context, ofPoints, false);
+            const GlProgram& used = use(ofPoints);
             gl.ProgramUniform1ui(used.id(), used.uniform("pointCount"), GLuint(points));
             dispatch(3, isAgain);
         }
@@ -509,7 +511,7 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
     };
     noteAll(Stage::elementFirst, Stage::pointFirst, false);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
-    const GlProgram& plan = useScan(context, Stage::plan, false);
+    const GlProgram& plan = use(Stage::plan);
     gl.ProgramUniform2uiv(plan.id(), plan.uniform("groupsAgain"), 4, &groups[0][0]);
     gl.DispatchCompute(1, 1, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
@@ -517,11 +519,11 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
     bindRecords(context);
     for (const Stage stage :
          {Stage::contenders0, Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
-        useScan(context, stage, false);
+        use(stage);
         gl.DispatchComputeIndirect(0);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
-    const GlProgram& clear = useScan(context, Stage::clear, false);
+    const GlProgram& clear = use(Stage::clear);
     gl.ProgramUniform1ui(clear.id(), clear.uniform("pointCount"), GLuint(all));
     dispatch(0, true);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
@@ -545,10 +547,7 @@ void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::v
         release(context, vertices_);
     }
     bindRecords(context);
-    const GlProgram& used = program(context, {Stage::values, false, channels_, levelsOf(format_)});
-    gl.UseProgram(used.id());
-    gl.ProgramUniform3ui(used.id(), used.uniform("regionSize"), GLuint(size_.x), GLuint(size_.y),
-                         GLuint(size_.z));
+    const GlProgram& used = useScan(context, {Stage::values, false, channels_, levelsOf(format_)});
     gl.ProgramUniform1f(used.id(), used.uniform("uncovered"), sampleMarks(format_).uncovered);
     gl.ProgramUniform1i(used.id(), used.uniform("isLast"), isLast);
     gl.BindImageTexture(0, target_.codes.id(), 0, GL_TRUE, 0, GL_WRITE_ONLY, target_.format);

@@ -121,7 +121,7 @@ class RasterDevice {
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
     void prepareScan(GlContext& context, std::size_t boxes);
     void findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer, std::size_t points);
-    const GlProgram& useScan(GlContext& context, Stage stage, bool isThin);
+    const GlProgram& useScan(GlContext& context, const Variant& variant);
     void bindRecords(GlContext& context);
     /// Of what is given to the device between them.
     void startTimer(GlContext& context);

@@ -62,17 +62,11 @@ double rankOf(Walk& walk, int lane, std::int64_t offset) {
 HWY_NOINLINE void writeContestedRun(Walk& walk, int lane, int row) {
     const Scratch& scratch = walk.scratch;
     const Runs& runs = scratch.runs;
-    const std::int32_t element = scratch.element[lane];
     std::int64_t offset = runs.offset[row];
     for (int k = 0; k < runs.length[row]; ++k, offset += scratch.stride[lane]) {
-        std::uint8_t& mark = walk.output.marks[offset];
-        if (mark == kNotCovered) {
-            mark = kStartsRun;
-            walk.output.owner[offset] = element;
-        } else {
-            ++walk.counts.contested;
-            if (!contestPoint(walk.input, walk.output, element, rankOf(walk, lane, offset), offset)) continue;
-        }
+        const bool takes = coverPoint(walk.input, walk.output, scratch.element[lane], offset, walk.counts,
+                                      [&] { return rankOf(walk, lane, offset); });
+        if (!takes) continue;
         const double number = double(runs.skipped[row]) + k;
         for (std::size_t c = 0; c < walk.input.channels.size(); ++c)
             walk.output.values[c][offset] = valueAt(scratch.channels[c], lane, row, number);

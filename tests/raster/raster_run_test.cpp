@@ -151,6 +151,7 @@ TEST(RasterRunsOnTwoPlatforms, GiveTheSameBitsAsAlone) {
     compareAtOnce({{"slicing", GlPlatform::eglSurfaceless},
                    {"slicing", GlPlatform::osmesa},
                    {"hybrid", GlPlatform::eglSurfaceless},
+                   {"hybrid", GlPlatform::osmesa},
                    {"compute", GlPlatform::eglSurfaceless},
                    {"compute", GlPlatform::osmesa}});
 }

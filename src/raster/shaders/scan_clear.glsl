@@ -1,10 +1,7 @@
 // Forgets what is noted of all points.
-layout(local_size_x = 64) in;
-
 uniform uint pointCount;
 
 void main() {
-    uint at = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-              gl_LocalInvocationIndex;
+    uint at = threadIndex();
     if (at < pointCount) owners[at] = orders[at] = 0u;
 }

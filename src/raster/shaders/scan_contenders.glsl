@@ -1,8 +1,6 @@
 // Whose the points are that several elements cover, a thread a contender: orders are forgotten (STEP 0), the
 // greatest is found (1), who came first and has it no longer goes (2), and of those that have it the one with
 // the least rank is the owner (3).
-layout(local_size_x = 64) in;
-
 // The order of an element at a point that it covers.
 uint orderOfRank(uint rank, uvec3 point) {
     uint kind = rank >> kKindShift, item = rank & kPlaceMask;
@@ -22,8 +20,7 @@ uint orderOfRank(uint rank, uvec3 point) {
 }
 
 void main() {
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-                 gl_LocalInvocationIndex;
+    uint index = threadIndex();
     if (index >= contenderCount) return;
     Contender contender = contenders[index];
     uint at = contender.at;

@@ -1,6 +1,4 @@
 // The points of the boxes of elements, a thread a box.
-layout(local_size_x = 64) in;
-
 struct Box {
     uint rank;
     uint low, last;  // points of the region, 8 bits an axis
@@ -30,8 +28,7 @@ Real depthIn(Geometry geometry, uvec3 point) {
 }
 
 void main() {
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-                 gl_LocalInvocationIndex;
+    uint index = threadIndex();
     if (index >= boxCount) return;
     Box box = boxes[firstBox + index];
     Geometry geometry = geometries[box.rank & kPlaceMask];

@@ -1,3 +1,11 @@
+// A dispatch has as many rows of workgroups as its threads need.
+layout(local_size_x = GROUP_THREADS) in;
+
+uint threadIndex() {
+    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
+           gl_LocalInvocationIndex;
+}
+
 // The owner of a point of the region, as the complement of its rank. 0: no element covers it.
 layout(std430, binding = 3) buffer Owners {
     uint owners[];

@@ -1,16 +1,15 @@
 // Sizes of the dispatches that follow, when it is known how many contenders there are: through their list or,
 // where that had no room for all, through everything once more.
-layout(local_size_x = 1) in;
-
 layout(std430, binding = 5) writeonly buffer Dispatches {
     uint groups[15];  // x, y, z: of contenders, points, easy elements, thin ones, decided points
 };
 uniform uvec2 groupsAgain[4];  // x, y of the last four
 
 void main() {
+    if (threadIndex() != 0u) return;
     bool fits = contenderCount <= contenderRoom;
-    uint ofContenders = fits ? (contenderCount + 63u) / 64u : 0u;
-    uint rows = (ofContenders + 32767u) / 32768u;
+    uint ofContenders = fits ? (contenderCount + GROUP_THREADS - 1u) / GROUP_THREADS : 0u;
+    uint rows = (ofContenders + GROUPS_A_ROW - 1u) / GROUPS_A_ROW;
     groups[0] = rows == 0u ? 0u : (ofContenders + rows - 1u) / rows;
     groups[1] = max(rows, 1u);
     groups[2] = 1u;

@@ -1,11 +1,8 @@
 // Notes the points that the processor decided, a thread for each.
-layout(local_size_x = 64) in;
-
 uniform uint pointCount;
 
 void main() {
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-                 gl_LocalInvocationIndex;
+    uint index = threadIndex();
     if (index >= pointCount) return;
     DecidedPoint point = decided[index];
     uint at = placeOf(uvec3(point.place & 0xffffu, point.place >> 16, point.layer));

@@ -1,6 +1,4 @@
 // A thread for each point of the region writes what its owner says, and forgets the owner when no pass follows.
-layout(local_size_x = 64) in;
-
 layout(std430, binding = 5) readonly buffer ThinChannels {
     Channel thinChannels[];
 };
