@@ -422,12 +422,12 @@ void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
         gl.ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
     };
     const std::int64_t points = std::int64_t(size_.x) * size_.y * size_.z;
-    if (!owners_ || owners_.bytes() < points * kOwnerBytes) {
+    if (!owners_ || !orders_ || owners_.bytes() < points * kOwnerBytes) {
+        areOwnersClear_ = false;  // there may be room for one of them only
         owners_.reset();
         orders_.reset();
         owners_ = GlBuffer(context, points * kOwnerBytes, 0);
         orders_ = GlBuffer(context, points * kOwnerBytes, 0);
-        areOwnersClear_ = false;
     }
     contenderRoom_ = isTight_ ? 1 : std::max<std::int64_t>(points / 2, kLeastContenders);
     const std::int64_t bytes = (contenderRoom_ + 1) * kContenderBytes;  // the count stands before them

@@ -22,7 +22,7 @@ struct Contender {
     uint at, order, rank, first;
 };
 layout(std430, binding = 7) buffer Contenders {
-    uint contenderCount;  // may be more than there is room for
+    volatile uint contenderCount;  // may be more than there is room for
     uint unused[3];
     Contender contenders[];
 };
