@@ -90,10 +90,11 @@
     X(PROGRAMUNIFORM1UI, ProgramUniform1ui) X(PROGRAMUNIFORM1UIV, ProgramUniform1uiv) \
     X(PROGRAMUNIFORM2D, ProgramUniform2d) X(PROGRAMUNIFORM2F, ProgramUniform2f) \
     X(PROGRAMUNIFORM2FV, ProgramUniform2fv) X(PROGRAMUNIFORM2I, ProgramUniform2i) \
-    X(PROGRAMUNIFORM2IV, ProgramUniform2iv) X(PROGRAMUNIFORM2UI, ProgramUniform2ui) X(PROGRAMUNIFORM2UIV, ProgramUniform2uiv) \
+    X(PROGRAMUNIFORM2IV, ProgramUniform2iv) X(PROGRAMUNIFORM2UI, ProgramUniform2ui) \
     X(PROGRAMUNIFORM3D, ProgramUniform3d) X(PROGRAMUNIFORM3F, ProgramUniform3f) \
     X(PROGRAMUNIFORM3FV, ProgramUniform3fv) X(PROGRAMUNIFORM3I, ProgramUniform3i) \
     X(PROGRAMUNIFORM3IV, ProgramUniform3iv) X(PROGRAMUNIFORM3UI, ProgramUniform3ui) \
+    X(PROGRAMUNIFORM3UIV, ProgramUniform3uiv) \
     X(PROGRAMUNIFORM4D, ProgramUniform4d) X(PROGRAMUNIFORM4F, ProgramUniform4f) \
     X(PROGRAMUNIFORM4FV, ProgramUniform4fv) X(PROGRAMUNIFORM4I, ProgramUniform4i) \
     X(PROGRAMUNIFORM4IV, ProgramUniform4iv) X(PROGRAMUNIFORM4UI, ProgramUniform4ui) \

@@ -12,10 +12,13 @@ namespace tessera {
 /// ones, as they are drawn; points that the processor decided come last. The record stands in the lower bits.
 inline constexpr int kRankKindShift = 28;
 
-/// A box has no more points, so that no thread is left with one at the end.
-inline constexpr int kScanBoxPoints = 192;
-/// Of a box on the device: its points, a bit each.
-inline constexpr int kScanBoxWords = (kScanBoxPoints + 31) / 32;
+/// A thread goes through no more points of a box: larger boxes are cut into parts.
+inline constexpr int kPartPoints = 192;
+/// Powers of two in the number of parts.
+inline constexpr std::size_t kPartSizes = 18;
+inline constexpr std::size_t kMostScanRuns = 2 * (1 + kPartSizes);
+/// Parts that there is room for on the device.
+inline constexpr std::size_t kPartRoom = std::size_t(1) << kPartSizes;
 
 /// Points of a region that an element may cover, 8 bits an axis; as the shaders read it.
 struct ScanBox {
@@ -23,13 +26,20 @@ struct ScanBox {
     std::uint32_t low, last;
 };
 
-/// What compute shaders go through, a thread a box: those of easy elements, then those of thin ones.
-struct ScanBoxes {
-    UninitializedVector<ScanBox> boxes;
-    std::size_t easyCount = 0;
+/// Boxes of which each has about as many parts.
+struct ScanRun {
+    bool isThin;  ///< else their elements are easy
+    std::size_t first, count;
+    std::uint32_t parts;  ///< of a box, at most
 };
 
-/// The boxes of each grade stand by place and size, so that neighbouring threads have about as much to do.
+/// What compute shaders go through: a box an element.
+struct ScanBoxes {
+    UninitializedVector<ScanBox> boxes;
+    std::vector<ScanRun> runs;
+};
+
+/// Small boxes stand by place and size, so that neighbouring threads have about as much to do.
 ScanBoxes listScanBoxes(const PreparedRegion& region);
 
 }  // namespace tessera

@@ -36,9 +36,9 @@ RasterBudget shareOut(std::int64_t workBytes, int channels) {
     const double codeBytes = recorded > 1 ? 16 : 4, depthBytes = 16;  // depths, or what a scan notes
     const double pointBytes =
         kTargetRoom * (codeBytes + depthBytes) + kRegionsAtOnce * double(passes) * codeBytes;
-    const double records = sizeof(SliceElement) + sizeof(ScanBox) + sizeof(EasyGeometry) +
+    const double records = sizeof(SliceElement) + 2 * sizeof(ScanBox) + sizeof(EasyGeometry) +
                            sizeof(ChannelRecord) * double(recorded);
-    const double onDevice = sizeof(EasyGeometry) + sizeof(ScanBox) + 4.0 * kScanBoxWords +
+    const double onDevice = sizeof(EasyGeometry) + sizeof(ScanBox) +
                             sizeof(ChannelRecord) * double(std::min(recorded, kPassChannels));
     const double elementBytes = kRegionsAtOnce * (kRecordRoom * records + kBufferRoom * onDevice);
     // The last eighth is for blocks that are put together and for what an emulated device keeps of

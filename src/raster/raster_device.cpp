@@ -22,6 +22,7 @@ constexpr const char* kDepthScale = "1.220703125e-4";
 /// Of a scan: threads of a workgroup, workgroups along one axis of a dispatch, and bytes of what it notes.
 constexpr std::size_t kGroupThreads = 64;
 constexpr std::size_t kGroupsARow = 32768;
+constexpr std::size_t kMostAgain = kMostScanRuns + 2;  ///< dispatches that are made once more
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
 /// corners.
@@ -31,6 +32,13 @@ constexpr GLenum kFragmentInvocations = 0x82F4;  // GL_ARB_pipeline_statistics_q
 int levelsOf(SampleFormat format) {
     if (format == SampleFormat::r8) return 255;
     return format == SampleFormat::r16 ? 65535 : 0;
+}
+
+/// Workgroups of a dispatch of so many threads.
+std::array<GLuint, 3> groupsOf(std::size_t threads) {
+    const std::size_t wanted = (threads + kGroupThreads - 1) / kGroupThreads;
+    const std::size_t rows = std::max<std::size_t>(1, (wanted + kGroupsARow - 1) / kGroupsARow);
+    return {GLuint((wanted + rows - 1) / rows), GLuint(rows), 1};
 }
 
 /// Counts while it lives: a query that stays open after a failure would keep all others from beginning.
@@ -126,15 +134,18 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
     if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
     defines.push_back({"STEP", std::to_string(int(stage) - int(Stage::contenders0))});
     for (const auto& [name, value] :
-         {std::pair("WORDS", std::size_t(kScanBoxWords)), std::pair("GROUP_THREADS", kGroupThreads),
-          std::pair("GROUPS_A_ROW", kGroupsARow)})
+         {std::pair("PART_POINTS", std::size_t(kPartPoints)),
+          std::pair("GROUP_THREADS", kGroupThreads), std::pair("GROUPS_A_ROW", kGroupsARow),
+          std::pair("MOST_AGAIN", kMostAgain)})
         defines.push_back({name, std::to_string(value) + "u"});
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
         return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
     };
     switch (stage) {
+        case Stage::parts:
+            return made(text::kScanParts, {text::kRecord, text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
         case Stage::plan:
-            return made(text::kScanPlan, {text::kScanMarks});
+            return made(text::kScanPlan, {text::kScanMarks, text::kScanPartCounts});
         case Stage::clear:
             return made(text::kScanClear, {text::kScanMarks});
         case Stage::contenders0:
@@ -151,7 +162,9 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
         case Stage::pointRanks:
             return made(text::kScanPoints, {text::kDecide, text::kScanMarks, text::kDecidedPoints});
         default:
-            return made(text::kScanElements, {text::kRecord, text::kDecide, text::kScanMarks});
+            return made(text::kScanElements,
+                        {text::kRecord, text::kDecide, text::kScanMarks, text::kScanBoxes,
+                         text::kScanPartCounts});
     }
 }
 
@@ -416,7 +429,7 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
     release(context, vertices_);
 }
 
-void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
+void RasterDevice::prepareScan(GlContext& context) {
     const GlFunctions& gl = context.functions();
     const auto clear = [&](const GlBuffer& buffer, std::int64_t bytes) {
         gl.ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
@@ -435,12 +448,11 @@ void RasterDevice::prepareScan(GlContext& context, std::size_t boxes) {
         contenders_ = GlBuffer();
         contenders_ = GlBuffer(context, bytes, 0);
     }
-    const std::int64_t boxBytes = std::int64_t(boxes) * kScanBoxWords * std::int64_t(sizeof(GLuint));
-    if (!coveredPoints_ || coveredPoints_.bytes() < boxBytes) {
-        coveredPoints_ = GlBuffer();
-        coveredPoints_ = GlBuffer(context, boxBytes + boxBytes / 4, 0);
-    }
-    if (!dispatches_) dispatches_ = GlBuffer(context, 15 * sizeof(GLuint), 0);
+    if (!dispatches_) dispatches_ = GlBuffer(context, 3 * (kMostAgain + 1) * sizeof(GLuint), 0);
+    if (!parts_) parts_ = GlBuffer(context, std::int64_t(kPartRoom * sizeof(ScanBox)), 0);
+    constexpr GLuint kNoParts[2][4] = {{0, 1, 1, 0}, {0, 1, 1, 0}};
+    if (!partCounts_) partCounts_ = GlBuffer(context, sizeof kNoParts, GL_DYNAMIC_STORAGE_BIT);
+    gl.NamedBufferSubData(partCounts_.id(), 0, sizeof kNoParts, kNoParts);
     if (!areOwnersClear_) clear(owners_, owners_.bytes());
     clear(contenders_, kContenderBytes);
     areOwnersClear_ = false;
@@ -467,65 +479,94 @@ const GlProgram& RasterDevice::useScan(GlContext& context, const Variant& varian
 }
 
 void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer,
-                              std::size_t points) {
+                              std::size_t points, GLuint pointBuffer) {
     const GlFunctions& gl = context.functions();
     const std::size_t all = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
-    const std::size_t counts[4] = {all, boxes.easyCount, boxes.boxes.size() - boxes.easyCount, points};
-    GLuint groups[4][2];  // x and y for each of these
-    for (std::size_t i = 0; i < 4; ++i) {
-        const std::size_t wanted = (counts[i] + kGroupThreads - 1) / kGroupThreads;
-        const std::size_t rows = std::max<std::size_t>(1, (wanted + kGroupsARow - 1) / kGroupsARow);
-        groups[i][0] = GLuint((wanted + rows - 1) / rows);
-        groups[i][1] = GLuint(rows);
-    }
+    // Of all points, decided points, and runs of boxes, of larger ones for a full list of parts.
+    constexpr std::size_t ofAll = 0, ofDecided = 1, ofRuns = 2;
+    std::vector<std::array<GLuint, 3>> groups{groupsOf(all), groupsOf(points)};
+    for (const ScanRun& run : boxes.runs)
+        groups.push_back(
+            groupsOf(run.parts == 1 ? run.count : run.parts * std::min(run.count, kPartRoom / run.parts)));
+    const auto dispatchBy = [&](const GlBuffer& buffer, GLintptr at) {
+        gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, buffer.id());
+        gl.DispatchComputeIndirect(at);
+    };
     const auto dispatch = [&](std::size_t i, bool isAgain) {
         if (isAgain)
-            gl.DispatchComputeIndirect(GLintptr((i + 1) * 3 * sizeof(GLuint)));
+            dispatchBy(dispatches_, GLintptr((i + 1) * sizeof(groups[0])));
         else
-            gl.DispatchCompute(groups[i][0], groups[i][1], 1);
+            gl.DispatchCompute(groups[i][0], groups[i][1], groups[i][2]);
     };
     // Owners don't depend on channels.
     const auto use = [&](Stage stage, bool isThin = false) -> const GlProgram& {
         return useScan(context, {stage, isThin, 1, 0});
     };
     // Buffers change places: there need not be more than eight.
+    int chunk = 0;
+    const auto useOnBoxes = [&](Stage stage, bool isThin, GLuint buffer, std::size_t first,
+                                std::size_t count) -> const GlProgram& {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, buffer);
+        const GlProgram& used = use(stage, isThin);
+        gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(first));
+        gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(count));
+        return used;
+    };
     const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, coveredPoints_.id());
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, boxBuffer);
-        for (const bool isThin : {false, true}) {
-            const std::size_t i = isThin ? 2 : 1;
-            if (counts[i] == 0) continue;
-            const Stream& geometry = isThin ? thinGeometry_ : easyGeometry_;
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, partCounts_.id());
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, parts_.id());
+        for (std::size_t r = 0; r < boxes.runs.size(); ++r) {
+            const ScanRun& run = boxes.runs[r];
+            const Stream& geometry = run.isThin ? thinGeometry_ : easyGeometry_;
             gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
-            const GlProgram& used = use(ofElements, isThin);
-            gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(isThin ? boxes.easyCount : 0));
-            gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(counts[i]));
-            dispatch(i, isAgain);
+            if (run.parts == 1) {
+                const GlProgram& used = useOnBoxes(ofElements, run.isThin, boxBuffer, run.first, run.count);
+                gl.ProgramUniform1i(used.id(), used.uniform("chunk"), -1);
+                dispatch(ofRuns + r, isAgain);
+                continue;
+            }
+            const std::size_t most = kPartRoom / run.parts;
+            for (std::size_t first = 0; first < run.count; first += most, ++chunk) {
+                const std::size_t count = std::min(most, run.count - first);
+                const GlProgram& cuts =
+                    useOnBoxes(Stage::parts, run.isThin, boxBuffer, run.first + first, count);
+                gl.ProgramUniform1ui(cuts.id(), cuts.uniform("partsABox"), run.parts);
+                gl.ProgramUniform1ui(cuts.id(), cuts.uniform("chunk"), GLuint(chunk));
+                dispatch(ofRuns + r, isAgain);
+                gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
+                const GlProgram& used = useOnBoxes(ofElements, run.isThin, parts_.id(), 0, 0);
+                gl.ProgramUniform1i(used.id(), used.uniform("chunk"), chunk);
+                dispatchBy(partCounts_, GLintptr(chunk % 2) * GLintptr(4 * sizeof(GLuint)));
+                gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+            }
         }
         if (points > 0) {
+            gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
             const GlProgram& used = use(ofPoints);
             gl.ProgramUniform1ui(used.id(), used.uniform("pointCount"), GLuint(points));
-            dispatch(3, isAgain);
+            dispatch(ofDecided, isAgain);
         }
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     };
     noteAll(Stage::elementFirst, Stage::pointFirst, false);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, partCounts_.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
     const GlProgram& plan = use(Stage::plan);
-    gl.ProgramUniform2uiv(plan.id(), plan.uniform("groupsAgain"), 4, &groups[0][0]);
+    gl.ProgramUniform3uiv(plan.id(), plan.uniform("groupsAgain"), GLsizei(groups.size()), groups[0].data());
+    gl.ProgramUniform1ui(plan.id(), plan.uniform("againCount"), GLuint(groups.size()));
     gl.DispatchCompute(1, 1, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
-    gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, dispatches_.id());
     bindRecords(context);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
     for (const Stage stage :
          {Stage::contenders0, Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
         use(stage);
-        gl.DispatchComputeIndirect(0);
+        dispatchBy(dispatches_, 0);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
     const GlProgram& clear = use(Stage::clear);
     gl.ProgramUniform1ui(clear.id(), clear.uniform("pointCount"), GLuint(all));
-    dispatch(0, true);
+    dispatch(ofAll, true);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     noteAll(Stage::elementOrders, Stage::pointOrders, true);
     noteAll(Stage::elementRanks, Stage::pointRanks, true);
@@ -537,16 +578,17 @@ void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::v
     const GlFunctions& gl = context.functions();
     startTimer(context);
     const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
-    if (pass == 0) prepareScan(context, boxes.boxes.size());
+    if (pass == 0) prepareScan(context);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 2, orders_.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, owners_.id());
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, upload(context, indices_, points));
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, contenders_.id());
+    const GLuint pointBuffer = upload(context, indices_, points);
     if (pass == 0) {
-        findOwners(context, boxes, upload(context, vertices_, boxes.boxes), points.size());
+        findOwners(context, boxes, upload(context, vertices_, boxes.boxes), points.size(), pointBuffer);
         release(context, vertices_);
     }
     bindRecords(context);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
     const GlProgram& used = useScan(context, {Stage::values, false, channels_, levelsOf(format_)});
     gl.ProgramUniform1f(used.id(), used.uniform("uncovered"), sampleMarks(format_).uncovered);
     gl.ProgramUniform1i(used.id(), used.uniform("isLast"), isLast);

@@ -80,6 +80,7 @@ class RasterDevice {
         pointFirst,
         pointOrders,
         pointRanks,
+        parts,
         plan,
         clear,
         contenders0,
@@ -119,8 +120,9 @@ class RasterDevice {
     const GlProgram& program(GlContext& context, const Variant& variant);
     GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
-    void prepareScan(GlContext& context, std::size_t boxes);
-    void findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer, std::size_t points);
+    void prepareScan(GlContext& context);
+    void findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer, std::size_t points,
+                    GLuint pointBuffer);
     const GlProgram& useScan(GlContext& context, const Variant& variant);
     void bindRecords(GlContext& context);
     /// Of what is given to the device between them.
@@ -154,9 +156,9 @@ class RasterDevice {
     Stream vertices_{kOfBatches}, indices_{kOfBatches};
     GlVertexArray spriteArray_, polygonArray_, pointArray_, silhouetteArray_, gouraudArray_;
     GlTexture alphaTexture_;
-    GlBuffer coveredPoints_;                 ///< of a scan's boxes
     GlBuffer owners_, orders_, contenders_;  ///< of a scan's points
     GlBuffer dispatches_;
+    GlBuffer parts_, partCounts_;  ///< of a scan's larger boxes, a chunk after the other
     std::int64_t contenderRoom_ = 0;
     bool isTight_ = false;
     bool areOwnersClear_ = false;  ///< no scan was broken off
