@@ -134,16 +134,16 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
     if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
     defines.push_back({"STEP", std::to_string(int(stage) - int(Stage::contenders0))});
     for (const auto& [name, value] :
-         {std::pair("PART_POINTS", std::size_t(kPartPoints)),
-          std::pair("GROUP_THREADS", kGroupThreads), std::pair("GROUPS_A_ROW", kGroupsARow),
-          std::pair("MOST_AGAIN", kMostAgain)})
+         {std::pair("PART_POINTS", std::size_t(kPartPoints)), std::pair("GROUP_THREADS", kGroupThreads),
+          std::pair("GROUPS_A_ROW", kGroupsARow), std::pair("MOST_AGAIN", kMostAgain)})
         defines.push_back({name, std::to_string(value) + "u"});
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
         return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
     };
     switch (stage) {
         case Stage::parts:
-            return made(text::kScanParts, {text::kRecord, text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
+            return made(text::kScanParts,
+                        {text::kRecord, text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
         case Stage::plan:
             return made(text::kScanPlan, {text::kScanMarks, text::kScanPartCounts});
         case Stage::clear:
@@ -162,9 +162,8 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
         case Stage::pointRanks:
             return made(text::kScanPoints, {text::kDecide, text::kScanMarks, text::kDecidedPoints});
         default:
-            return made(text::kScanElements,
-                        {text::kRecord, text::kDecide, text::kScanMarks, text::kScanBoxes,
-                         text::kScanPartCounts});
+            return made(text::kScanElements, {text::kRecord, text::kDecide, text::kScanMarks,
+                                              text::kScanBoxes, text::kScanPartCounts});
     }
 }
 
