@@ -4,7 +4,7 @@ foreach(name plan shape generator)
 endforeach()
 # Thread sanitizers have no place for the drivers of these.
 if(NOT TESSERA_SANITIZE MATCHES thread)
-  foreach(name run sceptic)
+  foreach(name run records sceptic)
     tessera_test(raster_${name}_test FOLDER raster OPTIMISED LINK reference registry PRIVATE_LINK contract_suite)
     list(APPEND raster_tests raster_${name}_test)
   endforeach()

@@ -37,6 +37,17 @@ struct ChannelRecord {
     float unused = 0;
 };
 
+/// A channel's code at a node: unrounded, and that of the value as a float.
+struct NodeCode {
+    double code;
+    float rounded;
+    std::uint32_t isInvalid;  ///< the value isn't finite as a float, and the others mean nothing
+};
+NodeCode nodeCode(const ChannelCoding& coding, std::int32_t node);
+
+/// The code of a channel of cells in an element. @param invalid where the value isn't finite as a float.
+float cellCode(const ChannelCoding& coding, std::int32_t element, float invalid);
+
 /// False when the device could lose a channel's values over an element to underflow; the element is then to
 /// be treated as hard, in all channels of a run alike.
 bool isSafeOnDevice(const ChannelCoding& coding, const TetMesh& mesh, std::int32_t element);

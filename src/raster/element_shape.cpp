@@ -10,11 +10,6 @@ namespace tessera {
 
 namespace {
 
-/// Rounding of a distance in a fragment, for each voxel of the reach of its arithmetic: coefficients,
-/// products and sums of three terms in float.
-constexpr double kFloatRounding = 0x1p-20;
-constexpr double kDoubleUnit = 0x1p-53;
-
 double lengthOf(const double (&v)[3]) {
     return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
@@ -54,7 +49,7 @@ double setUpFaces(ElementShape& shape) {
         if (!(largest > 0)) return INFINITY;
         for (double& x : n) x /= largest;
         const double length = lengthOf(n);
-        worst = std::max(worst, 64 * kDoubleUnit * size * size * (size + 1) / (largest * length));
+        worst = std::max(worst, kPlaneRounding * size * size * (size + 1) / (largest * length));
         double inner = 0, at = 0;
         for (int i = 0; i < 3; ++i) inner += n[i] * (shape.node[face][i] - a[i]);
         for (int i = 0; i < 3; ++i) {
@@ -101,16 +96,16 @@ ElementShape shapeElement(const TetMesh& mesh, const NodeFrame& frame, std::int3
     ElementShape shape;
     placeNodes(mesh, frame, element, shape);
     const double planeError = setUpFaces(shape);
-    if (!(planeError < 0x1p-12)) return shape;
+    if (!(planeError < kMostPlaneError)) return shape;
     const double thinnest = std::min({shape.height[0], shape.height[1], shape.height[2], shape.height[3]});
     if (!(thinnest > 8 * planeError) || thinnest > kLargestHeight) return shape;
-    const double reach = 1.01 * cornerReach(shape);
+    const double reach = kCornerFactor * cornerReach(shape);
     // Places in a fragment are at most a cell's edge from the point that coefficients are relative to.
     double size = 0, farthest = 0;
     for (int a = 0; a < 3; ++a) size = std::max(size, shape.high[a] - shape.low[a]);
     for (int face = 0; face < 4; ++face) farthest = std::max(farthest, shape.height[face]);
     const double arm = std::min(size, double(kCellEdge)) + 1;
-    const double inFloat = kFloatRounding * arm + 0x1p-23 * farthest + planeError;
+    const double inFloat = kFloatRounding * arm + kFloatUnit * farthest + planeError;
     const double inDouble = 2 * planeError;
     if (2 * inFloat * reach <= kLargestMargin) {
         shape.grade = ShapeGrade::easy;

@@ -39,6 +39,15 @@ struct ElementShape {
     ShapeGrade grade = ShapeGrade::hard;
 };
 
+/// The bounds' constants, which the device's shaders share. Of a plane within an element's box, for each
+/// 2^-53; the most of it that is bearable; of a distance in a fragment, for each voxel of the reach of its
+/// arithmetic: coefficients, products and sums of three terms in float; of a distance as it stands in float;
+/// and of a corner's reach.
+inline constexpr double kPlaneRounding = 64 * 0x1p-53, kMostPlaneError = 0x1p-12;
+inline constexpr double kFloatRounding = 0x1p-20, kFloatUnit = 0x1p-23, kCornerFactor = 1.01;
+/// Records hold the slack in float, rounded up.
+inline constexpr float kSlackFactor = 1 + 0x1p-20f;
+
 /// Largest ElementShape::margin, in voxels; the contract allows twice as much.
 inline constexpr double kLargestMargin = 0x1p-9;
 

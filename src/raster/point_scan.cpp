@@ -1,23 +1,14 @@
 #include "raster/point_scan.h"
 
-#include <algorithm>
+#include <array>
 #include <bit>
 #include <numeric>
 
 #include "base/check.h"
-#include "raster/regions.h"
 
 namespace tessera {
 
 namespace {
-
-/// Boxes stand by tiles of this edge, so that what is noted of their points stays in the caches.
-constexpr int kTileShift = 5, kTilesAnEdge = kCellEdge >> kTileShift;
-constexpr std::size_t kTiles = std::size_t(kTilesAnEdge) * kTilesAnEdge * kTilesAnEdge;
-/// Small ones in a tile by the power of two in the number of points, larger ones by that in the number of
-/// parts and then by tile.
-constexpr std::size_t kSizes = std::bit_width(unsigned(kPartPoints)), kSmallBuckets = kTiles * kSizes;
-constexpr std::size_t kBuckets = kSmallBuckets + kPartSizes * kTiles;
 
 std::uint32_t packed(const Vec3i& place) {
     return std::uint32_t(place.x) | std::uint32_t(place.y) << 8 | std::uint32_t(place.z) << 16;
@@ -40,43 +31,46 @@ unsigned partsOf(const Vec3i& size) {
 std::size_t bucketOf(const ScanBox& box) {
     const Vec3i low = unpacked(box.low), size = unpacked(box.last) - low + 1, at = low >> kTileShift;
     const std::size_t tile = std::size_t((at.z * kTilesAnEdge + at.y) * kTilesAnEdge + at.x);
+    const std::size_t ofGrade = box.rank >> (kRankKindShift + 1) == 0 ? 0 : kBuckets;
     const int points = size.x * size.y * size.z;
-    if (points <= kPartPoints) return tile * kSizes + std::size_t(std::bit_width(unsigned(points)) - 1);
-    return kSmallBuckets + std::size_t(std::bit_width(partsOf(size) - 1) - 1) * kTiles + tile;
+    if (points <= kPartPoints)
+        return ofGrade + tile * kSmallSizes + std::size_t(std::bit_width(unsigned(points)) - 1);
+    return ofGrade + kSmallBuckets + std::size_t(std::bit_width(partsOf(size) - 1) - 1) * kTiles + tile;
 }
 
-/// Sorts boxes of one grade behind those that the runs hold already.
-void appendSorted(const std::vector<ScanBox>& boxes, bool isThin, ScanBoxes& to) {
-    std::size_t first = to.runs.empty() ? 0 : to.runs.back().first + to.runs.back().count;
-    std::vector<std::size_t> next(kBuckets + 1, 0);
-    next[0] = first;
-    for (const ScanBox& box : boxes) ++next[bucketOf(box) + 1];
-    std::partial_sum(next.begin(), next.end(), next.begin());
-    for (std::size_t size = 0; size <= kPartSizes; ++size) {
-        const std::size_t last = next[kSmallBuckets + size * kTiles];
-        if (last > first) to.runs.push_back({isThin, first, last - first, 1u << size});
-        first = last;
-    }
-    for (const ScanBox& box : boxes) to.boxes[next[bucketOf(box)]++] = box;
+/// The first bucket of the i-th size: of small boxes, and of each number of parts.
+std::size_t firstBucket(std::size_t i) {
+    const std::size_t size = i % (kPartSizes + 1);
+    return i / (kPartSizes + 1) * kBuckets + (size == 0 ? 0 : kSmallBuckets + (size - 1) * kTiles);
 }
 
 }  // namespace
 
+std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first) {
+    std::vector<ScanRun> runs;
+    for (std::size_t i = 0; i + 1 < first.size(); ++i)
+        if (first[i + 1] > first[i])
+            runs.push_back({i > kPartSizes, first[i], first[i + 1] - first[i], 1u << i % (kPartSizes + 1)});
+    return runs;
+}
+
 ScanBoxes listScanBoxes(const PreparedRegion& region) {
     TESSERA_CHECK(region.elements.size() < std::size_t(1) << kRankKindShift, "ranks hold the records");
-    std::vector<ScanBox> easy, thin;
-    reserveLarge(easy, region.easy.geometry.size());
+    UninitializedVector<ScanBox> boxes;
+    reserveLarge(boxes, region.elements.size());
+    std::vector<std::uint32_t> next(2 * kBuckets + 1, 0);
     for (const SliceElement& e : region.elements) {
-        const bool isThin = e.grade == ShapeGrade::thin;
-        const std::uint32_t kind = (isThin ? 2u : 0u) + (e.isSmall ? 0u : 1u);
-        (isThin ? thin : easy)
-            .push_back({kind << kRankKindShift | e.record, packed({e.low[0], e.low[1], e.low[2]}),
-                        packed({e.high[0], e.high[1], e.high[2]})});
+        const std::uint32_t kind = (e.grade == ShapeGrade::thin ? 2u : 0u) + (e.isSmall ? 0u : 1u);
+        boxes.push_back({kind << kRankKindShift | e.record, packed({e.low[0], e.low[1], e.low[2]}),
+                         packed({e.high[0], e.high[1], e.high[2]})});
+        ++next[bucketOf(boxes.back()) + 1];
     }
-    ScanBoxes result;
-    resizeLarge(result.boxes, region.elements.size());
-    appendSorted(easy, false, result);
-    appendSorted(thin, true, result);
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    std::array<std::uint32_t, 2 * (kPartSizes + 1) + 1> first;
+    for (std::size_t i = 0; i < first.size(); ++i) first[i] = next[firstBucket(i)];
+    ScanBoxes result{{}, listScanRuns(first)};
+    resizeLarge(result.boxes, boxes.size());
+    for (const ScanBox& box : boxes) result.boxes[next[bucketOf(box)]++] = box;
     return result;
 }
 

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/large_pages.h"
 #include "raster/prepared_region.h"
+#include "raster/regions.h"
 
 namespace tessera {
 
@@ -39,7 +42,18 @@ struct ScanBoxes {
     std::vector<ScanRun> runs;
 };
 
-/// Small boxes stand by place and size, so that neighbouring threads have about as much to do.
+/// Boxes are sorted into buckets, of easy elements and then the same of thin ones. Small boxes stand by tile
+/// and the power of two in the number of points, so that what is noted of their points stays in the caches
+/// and neighbouring threads have about as much to do; larger ones by that in the number of parts, and tile.
+inline constexpr int kTileShift = 5, kTilesAnEdge = kCellEdge >> kTileShift;
+inline constexpr std::size_t kTiles = std::size_t(kTilesAnEdge) * kTilesAnEdge * kTilesAnEdge;
+inline constexpr std::size_t kSmallSizes = std::bit_width(unsigned(kPartPoints));
+inline constexpr std::size_t kSmallBuckets = kTiles * kSmallSizes;
+inline constexpr std::size_t kBuckets = kSmallBuckets + kPartSizes * kTiles;  ///< of a grade
+
+/// @param first where the boxes of each size begin: those of easy elements, those of thin ones, and the end.
+std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first);
+
 ScanBoxes listScanBoxes(const PreparedRegion& region);
 
 }  // namespace tessera

@@ -61,7 +61,7 @@ void recordGeometry(const ElementShape& shape, const double (&base)[3], const Ve
     }
     for (int a = 0; a < 3; ++a)
         geometry.base[a] = float(double(shape.first[a]) + base[a] - double(regionMin[a]));
-    geometry.slack = float(shape.slack) * (1 + 0x1p-20f);
+    geometry.slack = float(shape.slack) * kSlackFactor;
 }
 
 /// False when a channel's values need the processor.

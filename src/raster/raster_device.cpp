@@ -7,6 +7,7 @@
 #include "base/large_pages.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
+#include "raster/dispatch.h"
 #include "raster/hard_elements.h"
 #include "raster/shaders.h"
 #include "tessera/error.h"
@@ -19,9 +20,7 @@ namespace {
 constexpr int kPadding = kSmallExtent + 2;
 /// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
 constexpr const char* kDepthScale = "1.220703125e-4";
-/// Of a scan: threads of a workgroup, workgroups along one axis of a dispatch, and bytes of what it notes.
-constexpr std::size_t kGroupThreads = 64;
-constexpr std::size_t kGroupsARow = 32768;
+/// Of a scan: bytes of what it notes.
 constexpr std::size_t kMostAgain = kMostScanRuns + 2;  ///< dispatches that are made once more
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
@@ -32,13 +31,6 @@ constexpr GLenum kFragmentInvocations = 0x82F4;  // GL_ARB_pipeline_statistics_q
 int levelsOf(SampleFormat format) {
     if (format == SampleFormat::r8) return 255;
     return format == SampleFormat::r16 ? 65535 : 0;
-}
-
-/// Workgroups of a dispatch of so many threads.
-std::array<GLuint, 3> groupsOf(std::size_t threads) {
-    const std::size_t wanted = (threads + kGroupThreads - 1) / kGroupThreads;
-    const std::size_t rows = std::max<std::size_t>(1, (wanted + kGroupsARow - 1) / kGroupsARow);
-    return {GLuint((wanted + rows - 1) / rows), GLuint(rows), 1};
 }
 
 /// Counts while it lives: a query that stays open after a failure would keep all others from beginning.
@@ -133,12 +125,11 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
     if (stage == Stage::elementOrders || stage == Stage::pointOrders) defines.push_back({"ORDERS"});
     if (stage == Stage::elementRanks || stage == Stage::pointRanks) defines.push_back({"RANKS"});
     defines.push_back({"STEP", std::to_string(int(stage) - int(Stage::contenders0))});
-    for (const auto& [name, value] :
-         {std::pair("PART_POINTS", std::size_t(kPartPoints)), std::pair("GROUP_THREADS", kGroupThreads),
-          std::pair("GROUPS_A_ROW", kGroupsARow), std::pair("MOST_AGAIN", kMostAgain)})
-        defines.push_back({name, std::to_string(value) + "u"});
+    defines.push_back({"PART_POINTS", glslOf(std::size_t(kPartPoints))});
+    defines.push_back({"MOST_AGAIN", glslOf(kMostAgain)});
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
-        return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
+        shared.insert(shared.begin(), {text::kThreads, text::kRanks});
+        return makeComputeProgram(context, main, std::move(shared), defines);
     };
     switch (stage) {
         case Stage::parts:
@@ -214,15 +205,8 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
                          std::size_t pass, bool scans) {
     // Geometry stays where the first pass put it.
     const bool hasGeometry = pass == 0 || isReady_;
+    begin(context, region.points, inputs, pass, scans);
     isReady_ = false;
-    axes_ = inputs.axes;
-    format_ = inputs.format;
-    channels_ = inputs.recordedChannels(pass);
-    usedQueries_ = 0;  // of a region that was broken off
-    const Vec3i size = region.points.size();
-    size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
-    prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0), scans);
-    if (!scans) clear(context);
     if (!region.easy.geometry.empty()) {
         if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
         upload(context, easyChannels_, region.easy.channels[pass]);
@@ -236,6 +220,20 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
         upload(context, nodeCodes_, region.nodeCodes[pass]);
     }
     isReady_ = hasGeometry;
+}
+
+void RasterDevice::begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs,
+                         std::size_t pass, bool scans) {
+    isReady_ = false;
+    axes_ = inputs.axes;
+    format_ = inputs.format;
+    channels_ = inputs.recordedChannels(pass);
+    usedQueries_ = 0;  // of a region that was broken off
+    const Vec3i size = points.size();
+    size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
+    prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0), scans);
+    if (!scans) clear(context);
+    isReady_ = true;
 }
 
 /// At most two parts are under way on an emulated device.
@@ -457,15 +455,12 @@ void RasterDevice::prepareScan(GlContext& context) {
     areOwnersClear_ = false;
 }
 
-void RasterDevice::bindRecords(GlContext& context) {
-    const auto bind = [&](GLuint binding, const Stream& stream) {
-        context.functions().BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding,
-                                           stream.slots[stream.filled].buffer.id());
-    };
-    bind(0, easyGeometry_);
-    bind(1, easyChannels_);
-    bind(4, thinGeometry_);
-    bind(5, thinChannels_);
+void RasterDevice::bindRecords(GlContext& context, const ScanRecords& records) {
+    const GlFunctions& gl = context.functions();
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, records.easyGeometry);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, records.easyChannels);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, records.thinGeometry);
+    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, records.thinChannels);
 }
 
 const GlProgram& RasterDevice::useScan(GlContext& context, const Variant& variant) {
@@ -477,14 +472,14 @@ const GlProgram& RasterDevice::useScan(GlContext& context, const Variant& varian
     return used;
 }
 
-void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer,
-                              std::size_t points, GLuint pointBuffer) {
+void RasterDevice::findOwners(GlContext& context, const ScanRecords& records, std::size_t points,
+                              GLuint pointBuffer) {
     const GlFunctions& gl = context.functions();
     const std::size_t all = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
     // Of all points, decided points, and runs of boxes, of larger ones for a full list of parts.
     constexpr std::size_t ofAll = 0, ofDecided = 1, ofRuns = 2;
     std::vector<std::array<GLuint, 3>> groups{groupsOf(all), groupsOf(points)};
-    for (const ScanRun& run : boxes.runs)
+    for (const ScanRun& run : records.runs)
         groups.push_back(
             groupsOf(run.parts == 1 ? run.count : run.parts * std::min(run.count, kPartRoom / run.parts)));
     const auto dispatchBy = [&](const GlBuffer& buffer, GLintptr at) {
@@ -514,12 +509,13 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
     const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
         gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, partCounts_.id());
         gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, parts_.id());
-        for (std::size_t r = 0; r < boxes.runs.size(); ++r) {
-            const ScanRun& run = boxes.runs[r];
-            const Stream& geometry = run.isThin ? thinGeometry_ : easyGeometry_;
-            gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
+        for (std::size_t r = 0; r < records.runs.size(); ++r) {
+            const ScanRun& run = records.runs[r];
+            gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0,
+                              run.isThin ? records.thinGeometry : records.easyGeometry);
             if (run.parts == 1) {
-                const GlProgram& used = useOnBoxes(ofElements, run.isThin, boxBuffer, run.first, run.count);
+                const GlProgram& used =
+                    useOnBoxes(ofElements, run.isThin, records.boxes, run.first, run.count);
                 gl.ProgramUniform1i(used.id(), used.uniform("chunk"), -1);
                 dispatch(ofRuns + r, isAgain);
                 continue;
@@ -528,7 +524,7 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
             for (std::size_t first = 0; first < run.count; first += most, ++chunk) {
                 const std::size_t count = std::min(most, run.count - first);
                 const GlProgram& cuts =
-                    useOnBoxes(Stage::parts, run.isThin, boxBuffer, run.first + first, count);
+                    useOnBoxes(Stage::parts, run.isThin, records.boxes, run.first + first, count);
                 gl.ProgramUniform1ui(cuts.id(), cuts.uniform("partsABox"), run.parts);
                 gl.ProgramUniform1ui(cuts.id(), cuts.uniform("chunk"), GLuint(chunk));
                 dispatch(ofRuns + r, isAgain);
@@ -555,7 +551,7 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
     gl.ProgramUniform1ui(plan.id(), plan.uniform("againCount"), GLuint(groups.size()));
     gl.DispatchCompute(1, 1, 1);
     gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
-    bindRecords(context);
+    bindRecords(context, records);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
     for (const Stage stage :
          {Stage::contenders0, Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
@@ -574,6 +570,17 @@ void RasterDevice::findOwners(GlContext& context, const ScanBoxes& boxes, GLuint
 void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::vector<DecidedPoint>& points,
                         std::size_t pass, bool isLast) {
     if (!isReady_) return;
+    const auto idOf = [](const Stream& stream) { return stream.slots[stream.filled].buffer.id(); };
+    ScanRecords records{idOf(easyGeometry_), idOf(easyChannels_), idOf(thinGeometry_), idOf(thinChannels_), 0,
+                        boxes.runs};
+    if (pass == 0) records.boxes = upload(context, vertices_, boxes.boxes);
+    scan(context, records, points, pass, isLast);
+    if (pass == 0) release(context, vertices_);
+}
+
+void RasterDevice::scan(GlContext& context, const ScanRecords& records,
+                        const std::vector<DecidedPoint>& points, std::size_t pass, bool isLast) {
+    if (!isReady_) return;
     const GlFunctions& gl = context.functions();
     startTimer(context);
     const FragmentCount count(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
@@ -582,11 +589,8 @@ void RasterDevice::scan(GlContext& context, const ScanBoxes& boxes, const std::v
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 3, owners_.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 7, contenders_.id());
     const GLuint pointBuffer = upload(context, indices_, points);
-    if (pass == 0) {
-        findOwners(context, boxes, upload(context, vertices_, boxes.boxes), points.size(), pointBuffer);
-        release(context, vertices_);
-    }
-    bindRecords(context);
+    if (pass == 0) findOwners(context, records, points.size(), pointBuffer);
+    bindRecords(context, records);
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
     const GlProgram& used = useScan(context, {Stage::values, false, channels_, levelsOf(format_)});
     gl.ProgramUniform1f(used.id(), used.uniform("uncovered"), sampleMarks(format_).uncovered);

@@ -14,6 +14,7 @@
 #include "raster/hard_elements.h"
 #include "raster/point_scan.h"
 #include "raster/prepared_region.h"
+#include "raster/record_maker.h"
 #include "tessera/resampler.h"
 
 namespace tessera {
@@ -45,10 +46,19 @@ class RasterDevice {
     /// @param scans the region is scanned, not drawn.
     void begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                std::size_t pass = 0, bool scans = false);
+    /// The same of a region whose records are made on the device.
+    void begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs, std::size_t pass,
+               bool scans);
+    /// Of records that are made on the device.
+    RecordMaker& records() { return records_; }
     /// Samples the region by compute shaders, layers along z. The boxes and the places of the points are
     /// those of the first pass.
     void scan(GlContext& context, const ScanBoxes& boxes, const std::vector<DecidedPoint>& points,
               std::size_t pass, bool isLast);
+    void scan(GlContext& context, const ScanRecords& records, const std::vector<DecidedPoint>& points,
+              std::size_t pass, bool isLast);
+    /// Adds to the bytes that takeCounts() gives.
+    void countUpload(std::int64_t bytes) { counts_.uploadBytes += bytes; }
     /// Draws what a generator made. Each slice may be drawn by one call only.
     void draw(GlContext& context, const SliceBatch& batch);
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);
@@ -121,10 +131,9 @@ class RasterDevice {
     GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
     void prepareScan(GlContext& context);
-    void findOwners(GlContext& context, const ScanBoxes& boxes, GLuint boxBuffer, std::size_t points,
-                    GLuint pointBuffer);
+    void findOwners(GlContext& context, const ScanRecords& records, std::size_t points, GLuint pointBuffer);
     const GlProgram& useScan(GlContext& context, const Variant& variant);
-    void bindRecords(GlContext& context);
+    void bindRecords(GlContext& context, const ScanRecords& records);
     /// Of what is given to the device between them.
     void startTimer(GlContext& context);
     void stopTimer(GlContext& context);
@@ -150,6 +159,7 @@ class RasterDevice {
     bool countsFragments_;
     GlFence lastPart_;  ///< of a device that is emulated
     std::map<Variant, GlProgram> programs_;
+    RecordMaker records_;
     Target target_;
     Stream easyGeometry_{kOfRegions}, easyChannels_{kOfRegions}, thinGeometry_{kOfRegions},
         thinChannels_{kOfRegions}, published_{kOfRegions}, nodeCodes_{kOfRegions};

@@ -29,15 +29,9 @@ namespace {
 /// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
 constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
 
-/// A wanted box being put together from its regions.
-struct OpenBlock {
-    Block block;
-    int partsLeft = 0;
-};
-
 /// A region on its way through the device.
 struct RegionJob {
-    const RasterRegion* region = nullptr;
+    RasterRegion region;
     PreparedRegion prepared;  ///< kept until the device is done
     /// Kept for the passes after the first, when there is room for all of them.
     std::vector<std::shared_ptr<const SliceBatch>> batches;
@@ -112,8 +106,20 @@ class BoundRaster : public BoundResampler {
 
       private:
         void plan();
+        /// The mesh as the device makes records of it; null where the processor makes them.
+        std::shared_ptr<const DeviceMesh> meshOnDevice();
+        void placeNodes();
         void binRegions();
-        void start(std::size_t region);
+        /// Starts the first region that is left, the index-th of all.
+        void start(std::size_t index);
+        /// The same where the device makes the records.
+        void startOnDevice();
+        /// Lists what the device is to make records of, and makes the geometry; cuts regions with too many
+        /// elements.
+        RecordMaker::Made makeRecords(RegionJob& job);
+        /// Puts pieces of a region before those that are left; false when it can't be cut.
+        bool cut(const RasterRegion& region, std::int64_t pieces);
+        void postResult(RegionJob& job, std::size_t pass);
         void generate(RegionJob& job, std::size_t pass);
         void emit(RegionJob& job, std::size_t pass);
         void post(RegionJob& job, std::shared_ptr<const SliceBatch> batch, std::shared_ptr<const void> room);
@@ -145,11 +151,12 @@ class BoundRaster : public BoundResampler {
         std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
         NodeFrame frame_;
         SliceAxes axes_;
-        std::vector<RasterRegion> regions_;
-        std::deque<RegionJob> jobs_;  ///< under way, oldest first; tasks refer to them
+        std::shared_ptr<const DeviceMesh> deviceMesh_;
+        std::deque<RasterRegion> left_;  ///< to be started
+        std::deque<RegionJob> jobs_;     ///< under way, oldest first; tasks refer to them
         ElementBins bins_;
-        std::vector<std::unique_ptr<OpenBlock>> blocks_;
-        std::vector<int> partCounts_;
+        std::vector<std::unique_ptr<Block>> blocks_;
+        std::vector<int> partsLeft_;  ///< of each box
         ResampleStatistics statistics_;
         std::mutex mutex_;
     };
@@ -178,6 +185,7 @@ class BoundRaster : public BoundResampler {
     std::string target_;
     std::shared_ptr<const SliceGenerator> generator_;
     std::vector<ChannelCoding> channels_;
+    mutable std::shared_ptr<const DeviceMesh> onDevice_;  ///< the whole mesh, once a scan needed it
 };
 
 ResampleStatistics BoundRaster::Run::all() {
@@ -192,12 +200,15 @@ ResampleStatistics BoundRaster::Run::all() {
     plan();
     statistics_.addMs(stage::bin, timer.restart());
     try {
-        for (std::size_t r = 0; r < regions_.size(); ++r) {
+        for (std::int64_t started = 1; !left_.empty(); ++started) {
             execution_.throwIfCancelled();
             // The device draws one region while the processor prepares the next.
-            start(r);
+            if (deviceMesh_)
+                startOnDevice();
+            else
+                start(std::size_t(started) - 1);
             if (jobs_.size() > 1) finishOldest();
-            execution_.report(Stage::sampling, std::int64_t(r) + 1, std::int64_t(regions_.size()));
+            execution_.report(Stage::sampling, started, started + std::int64_t(left_.size()));
         }
         while (!jobs_.empty()) finishOldest();
     } catch (...) {
@@ -210,7 +221,7 @@ ResampleStatistics BoundRaster::Run::all() {
     }
     const RasterCounts counts = device_.thread().run([&](GlContext&) { return device_.takeCounts(); });
     for (std::size_t b = 0; b < boxes_.size() && !slots_; ++b)
-        if (partCounts_[b] == 0) {
+        if (boxes_[b].empty()) {
             open(b);
             deliver(b);
         }
@@ -226,42 +237,135 @@ ResampleStatistics BoundRaster::Run::all() {
 }
 
 void BoundRaster::Run::plan() {
-    regions_ = planRasterRegions(boxes_, budget_.regionPoints);
-    frame_ = frameNodes(mesh(), lattice_, execution_);
-    axes_ = SliceAxes::along(slots_ || bound_.isScan_ ? 2 : chooseLayerAxis(mesh(), frame_, execution_));
-    binRegions();
+    deviceMesh_ = meshOnDevice();
+    const std::vector<RasterRegion> regions = planRasterRegions(boxes_, budget_.regionPoints);
+    left_.assign(regions.begin(), regions.end());
+    axes_ = SliceAxes::along(2);
+    if (deviceMesh_) {
+        device_.thread().run(
+            [&](GlContext& context) { device_.records().place(context, *deviceMesh_, lattice_); });
+    } else {
+        placeNodes();
+        if (!slots_ && !bound_.isScan_) axes_ = SliceAxes::along(chooseLayerAxis(mesh(), frame_, execution_));
+        binRegions();
+    }
     blocks_.resize(boxes_.size());
-    partCounts_.assign(boxes_.size(), 0);
-    for (const RasterRegion& region : regions_)
-        for (const RasterRegion::Part& part : region.parts) ++partCounts_[part.box];
+    partsLeft_.assign(boxes_.size(), 0);
+    for (const RasterRegion& region : left_)
+        for (const RasterRegion::Part& part : region.parts) ++partsLeft_[part.box];
     statistics_.add(counted::elementsNear, mesh().elementCount());
     statistics_.add(counted::coveredPoints, 0);
     statistics_.add(counted::elementBlockPairs, std::int64_t(bins_.elements.size()));
+}
+
+std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
+    // What is near a few boxes is gathered for them, and not worth the way to the device.
+    if (!bound_.isScan_ || part_ || mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
+    // An emulated device's memory is this process's own.
+    const WorkMemory work = rasterWorkMemory(int(channels_.size()));
+    const std::int64_t bytes = bound_.workBytes_ > 0 ? std::max(bound_.workBytes_, work.least) : work.most;
+    const std::int64_t ofMesh = DeviceMesh::bytesOf(mesh(), channels_);
+    if (device_.thread().info().isSoftware) {
+        if (ofMesh > bytes / 4) return nullptr;
+        budget_ = shareOut(bytes - ofMesh, int(channels_.size()));
+    }
+    GlThread& thread = device_.thread();
+    if (!thread.run([&](GlContext& context) { return device_.records().isExact(context); })) return nullptr;
+    if (!bound_.onDevice_) {
+        const DeviceMesh::Source source(mesh(), channels_, bound_.format_, execution_);
+        bound_.onDevice_ = thread.run([&](GlContext& context) {
+            auto made = std::make_unique<DeviceMesh>(context, source);
+            context.throwIfFailed();
+            device_.countUpload(made->uploadedBytes());
+            return std::shared_ptr<const DeviceMesh>(
+                made.release(), [&thread](const DeviceMesh* mesh) { thread.dispose(mesh); });
+        });
+    }
+    return bound_.onDevice_;
+}
+
+void BoundRaster::Run::placeNodes() {
+    if (frame_.nodes.empty()) frame_ = frameNodes(mesh(), lattice_, execution_);
 }
 
 /// Regions that more elements reach than there is memory for are cut.
 void BoundRaster::Run::binRegions() {
     for (;;) {
         std::vector<IndexBox> regionBoxes;
-        for (const RasterRegion& region : regions_) regionBoxes.push_back(region.points);
+        for (const RasterRegion& region : left_) regionBoxes.push_back(region.points);
         bins_ = binElements(mesh(), frame_, regionBoxes, execution_, {.marginVoxels = float(kLargestMargin)});
         std::vector<RasterRegion> cut;
-        for (std::size_t r = 0; r < regions_.size(); ++r)
-            cutRegion(std::move(regions_[r]),
+        for (std::size_t r = 0; r < left_.size(); ++r)
+            cutRegion(std::move(left_[r]),
                       1 + (std::int64_t(bins_.of(r).size()) - 1) / budget_.regionElements, cut);
-        const bool isDone = cut.size() == regions_.size();
-        regions_ = std::move(cut);
+        const bool isDone = cut.size() == left_.size();
+        left_.assign(cut.begin(), cut.end());
         if (isDone) return;
     }
 }
 
-void BoundRaster::Run::start(std::size_t region) {
+bool BoundRaster::Run::cut(const RasterRegion& region, std::int64_t pieces) {
+    std::vector<RasterRegion> cut;
+    cutRegion(region, pieces, cut);
+    if (cut.size() <= 1) return false;
+    for (const RasterRegion::Part& part : region.parts) --partsLeft_[part.box];
+    for (const RasterRegion& piece : cut)
+        for (const RasterRegion::Part& part : piece.parts) ++partsLeft_[part.box];
+    left_.insert(left_.begin(), cut.begin(), cut.end());
+    return true;
+}
+
+RecordMaker::Made BoundRaster::Run::makeRecords(RegionJob& job) {
+    RecordMaker& maker = device_.records();
+    for (;;) {
+        job.region = std::move(left_.front());
+        left_.pop_front();
+        const IndexBox points = job.prepared.points = job.region.points;
+        const std::int64_t near = device_.thread().run(
+            [&](GlContext& context) { return maker.findNear(context, *deviceMesh_, points); });
+        if (near > budget_.regionElements && cut(job.region, 1 + (near - 1) / budget_.regionElements))
+            continue;
+        statistics_.add(counted::elementBlockPairs, near);
+        return device_.thread().run(
+            [&](GlContext& context) { return maker.makeGeometry(context, *deviceMesh_); });
+    }
+}
+
+void BoundRaster::Run::startOnDevice() {
     RegionJob& job = jobs_.emplace_back();
-    job.region = &regions_[region];
+    const Timer timer;
+    RecordMaker::Made made = makeRecords(job);
+    statistics_.addMs(stage::bin, timer.elapsedMs());
+    job.prepared.hard = std::move(made.hard);
+    statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
+    if (!job.prepared.hard.empty()) placeNodes();
+    const RasterInputs inputs = this->inputs();
+    for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
+        const bool isLast = pass + 1 == inputs.passCount();
+        job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
+            device_.begin(context, job.region.points, inputs, pass, true);
+            device_.records().makeChannels(context, *deviceMesh_, pass, inputs.format);
+        }));
+        auto points = std::make_shared<const std::vector<DecidedPoint>>(
+            decideHardElements(inputs, job.prepared, pass, execution_));
+        job.draws.push_back(
+            device_.thread().post([this, points, runs = made.runs, pass, isLast](GlContext& context) {
+                ScanRecords records = device_.records().records();
+                records.runs = runs;
+                device_.scan(context, records, *points, pass, isLast);
+            }));
+        postResult(job, pass);
+    }
+}
+
+void BoundRaster::Run::start(std::size_t index) {
+    RegionJob& job = jobs_.emplace_back();
+    job.region = std::move(left_.front());
+    left_.pop_front();
     const RasterInputs inputs = this->inputs();
     const Timer timer;
     const auto prepare = bound_.isPublished_ ? preparePublishedRegion : prepareRegion;
-    job.prepared = prepare(inputs, regions_[region].points, bins_.of(region), execution_);
+    job.prepared = prepare(inputs, job.region.points, bins_.of(index), execution_);
     statistics_.addMs(stage::bin, timer.elapsedMs());
     statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
     statistics_.add(counted::elementSlicePairs, job.prepared.emptyPairs);
@@ -270,14 +374,18 @@ void BoundRaster::Run::start(std::size_t region) {
             device_.begin(context, job.prepared, inputs, pass, bound_.isScan_);
         }));
         generate(job, pass);
-        if (slots_)
-            job.draws.push_back(device_.thread().post(
-                [this, pass, at = job.region](GlContext& context) { keep(context, *at, pass); }));
-        else
-            job.images.push_back(
-                device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
+        postResult(job, pass);
     }
     job.batches.clear();
+}
+
+void BoundRaster::Run::postResult(RegionJob& job, std::size_t pass) {
+    if (slots_)
+        job.draws.push_back(device_.thread().post(
+            [this, pass, &job](GlContext& context) { keep(context, job.region, pass); }));
+    else
+        job.images.push_back(
+            device_.thread().post([this](GlContext& context) { return device_.readBack(context); }));
 }
 
 void BoundRaster::Run::keep(GlContext& context, const RasterRegion& region, std::size_t pass) {
@@ -370,30 +478,29 @@ void BoundRaster::Run::finishOldest() {
         jobs_.pop_front();
         return;
     }
-    const auto& parts = job.region->parts;
+    const auto& parts = job.region.parts;
     parallelFor(execution_, std::int64_t(parts.size()),
-                [&](std::int64_t p) { copyPart(*job.region, parts[std::size_t(p)], images); });
+                [&](std::int64_t p) { copyPart(job.region, parts[std::size_t(p)], images); });
     jobs_.pop_front();
 }
 
 Block& BoundRaster::Run::open(std::size_t box) {
     const std::lock_guard lock(mutex_);
-    std::unique_ptr<OpenBlock>& opened = blocks_[box];
+    std::unique_ptr<Block>& opened = blocks_[box];
     if (!opened) {
-        opened = std::make_unique<OpenBlock>();
-        Block& block = opened->block;
+        opened = std::make_unique<Block>();
+        Block& block = *opened;
         block.lattice = lattice_;
         block.box = boxes_[box];
         block.channels = int(bound_.channels_.size());
         block.values.assign(block.count() * bound_.channels_.size(), 0.0f);
         block.coverage.assign(block.count(), 0);
-        opened->partsLeft = partCounts_[box];
     }
-    return opened->block;
+    return *opened;
 }
 
 void BoundRaster::Run::deliver(std::size_t box) {
-    sink_(box, blocks_[box]->block);
+    sink_(box, *blocks_[box]);
     blocks_[box].reset();
 }
 
@@ -407,7 +514,7 @@ void BoundRaster::Run::copyPart(const RasterRegion& region, const RasterRegion::
     {
         const std::lock_guard lock(mutex_);
         statistics_.add(counted::coveredPoints, covered);
-        isWhole = --blocks_[part.box]->partsLeft == 0;
+        isWhole = --partsLeft_[part.box] == 0;
     }
     if (isWhole) deliver(part.box);
 }

@@ -185,13 +185,6 @@ RasterImage render(RasterDevice& device, const RasterInputs& inputs, const Index
     });
 }
 
-/// Its objects end on the device's thread.
-std::shared_ptr<RasterDevice> makeDevice(GlPlatform platform) {
-    GlThread& thread = sharedGlThread(platform);
-    return {new RasterDevice(thread),
-            [&thread](RasterDevice* device) { thread.run([device](GlContext&) { delete device; }); }};
-}
-
 TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
     TetMesh mesh = smallMesh(2);
     // Thin and hard elements too, inside and beside the others.
@@ -243,24 +236,6 @@ RasterImage scan(RasterDevice& device, const RasterInputs& inputs, const IndexBo
         device.scan(context, boxes, decided, 0, true);
         return device.readBack(context);
     });
-}
-
-/// Elements of all grades; sides that lie on lattice planes and nodes on lattice points, where up to 24
-/// elements are equally deep; one as large as the region, whose box is cut.
-TetMesh contestedMesh() {
-    TetMesh mesh = boxMesh({.cells = Vec3i(4)});
-    mesh.fields.clear();
-    appendMesh(mesh, boxMesh({.cells = Vec3i(3), .jitter = 0.25, .seed = 3}));
-    appendMesh(mesh, thinTetsMesh(ThinKind::sliver, 1e-5, 0.7, 20, 3));
-    appendMesh(mesh, thinTetsMesh(ThinKind::needle, 1e-9, 0.7, 20, 4));
-    const auto first = std::int32_t(mesh.points.size());
-    for (const Vec3d& point : {Vec3d(0, 0, 0), Vec3d(1, 0.1, 0), Vec3d(0.2, 1, 0.1), Vec3d(0, 0.1, 1)})
-        mesh.points.push_back(point);
-    mesh.tets.push_back({first, first + 1, first + 2, first + 3});
-    addPointField(mesh, "wavy", {wavyField});
-    addRandomField(mesh, "vector", FieldLocation::point, 3, 0, 1, 5);
-    addHoledCopy(mesh, 0, "holed", 5);
-    return mesh;
 }
 
 TEST_P(RasterRuns, AScanGivesTheBitsOfADrawing) {
@@ -316,6 +291,7 @@ class BrokenOff {
               const std::vector<int>& fields = {0, 1, 2})
         : platform_(platform),
           bound_(namedResampler(algorithm).bind(mesh_, fields, on(platform, format))),
+          first_(sampleBound(*bound_, lattice_, boxes_)),
           whole_(sampleBound(*bound_, lattice_, boxes_)) {}
 
     void run(const BlockSink& sink, const Execution& execution = {.threads = 2}) const {
@@ -345,7 +321,7 @@ class BrokenOff {
     std::vector<IndexBox> boxes_ = contract::cut(centredBox(24), 9);
     GlPlatform platform_;
     std::unique_ptr<BoundResampler> bound_;
-    Sampled whole_;
+    Sampled first_, whole_;  ///< the first puts the mesh on the device
 };
 
 const BlockSink kNobody = [](std::size_t, const Block&) {};

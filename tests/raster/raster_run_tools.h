@@ -93,4 +93,31 @@ inline std::int64_t liveObjects(GlPlatform platform) {
     return sharedGlThread(platform).run([](GlContext& context) { return context.liveObjects(); });
 }
 
+/// Its objects end on the device's thread.
+inline std::shared_ptr<RasterDevice> makeDevice(GlPlatform platform) {
+    GlThread& thread = sharedGlThread(platform);
+    return {new RasterDevice(thread),
+            [&thread](RasterDevice* device) { thread.run([device](GlContext&) { delete device; }); }};
+}
+
+/// Elements of all grades; sides that lie on lattice planes and nodes on lattice points, where up to 24
+/// elements are equally deep; one as large as the region, whose box is cut.
+inline TetMesh contestedMesh() {
+    TetMesh mesh = boxMesh({.cells = Vec3i(4)});
+    mesh.fields.clear();
+    appendMesh(mesh, boxMesh({.cells = Vec3i(3), .jitter = 0.25, .seed = 3}));
+    appendMesh(mesh, thinTetsMesh(ThinKind::sliver, 1e-5, 0.7, 20, 3));
+    appendMesh(mesh, thinTetsMesh(ThinKind::needle, 1e-9, 0.7, 20, 4));
+    appendMesh(mesh, thinTetsMesh(ThinKind::sliver, 1e-13, 0.7, 10, 5));
+    const auto first = std::int32_t(mesh.points.size());
+    for (const Vec3d& point : {Vec3d(0, 0, 0), Vec3d(1, 0.1, 0), Vec3d(0.2, 1, 0.1), Vec3d(0, 0.1, 1)})
+        mesh.points.push_back(point);
+    mesh.tets.push_back({first, first + 1, first + 2, first + 3});
+    addPointField(mesh, "wavy", {wavyField});
+    addRandomField(mesh, "vector", FieldLocation::point, 3, 0, 1, 5);
+    addHoledCopy(mesh, 0, "holed", 5);
+    addElementIdField(mesh, "element");
+    return mesh;
+}
+
 }  // namespace tessera::rastertest

@@ -1,4 +1,8 @@
 // The points of boxes, a thread a box.
+layout(std430, binding = 5) readonly buffer Boxes {
+    Box boxes[];
+};
+uniform uint firstBox, boxCount;
 uniform int chunk;  // boxes are parts, as many as scan_parts.glsl listed; -1: they aren't
 // The i-th point of a box of at most 2^10 points; the reciprocals are those of a row's and a layer's count.
 uvec3 placeInBox(uint i, uvec3 size, float ofRow, float ofLayer) {

@@ -1,11 +1,3 @@
-// A dispatch has as many rows of workgroups as its threads need.
-layout(local_size_x = GROUP_THREADS) in;
-
-uint threadIndex() {
-    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x +
-           gl_LocalInvocationIndex;
-}
-
 // The owner of a point of the region, as the complement of its rank. 0: no element covers it.
 layout(std430, binding = 3) buffer Owners {
     uint owners[];
@@ -27,10 +19,6 @@ layout(std430, binding = 7) buffer Contenders {
     Contender contenders[];
 };
 uniform uint contenderRoom;
-
-// As src/raster/point_scan.h ranks the elements of a region: a kind in the highest bits.
-const uint kKindShift = 28u;
-const uint kPlaceMask = (1u << kKindShift) - 1u;
 
 uint placeOf(uvec3 point) {
     return (point.z * regionSize.y + point.y) * regionSize.x + point.x;

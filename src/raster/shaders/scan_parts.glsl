@@ -1,4 +1,8 @@
 // Cuts larger boxes into parts, a thread a part, and lists those in which the element may have points.
+layout(std430, binding = 5) readonly buffer Boxes {
+    Box boxes[];
+};
+uniform uint firstBox, boxCount;
 layout(std430, binding = 6) writeonly buffer Parts {
     Box parts[];
 };
@@ -21,16 +25,7 @@ void main() {
     if (index == 0u) clearPartCount((chunk + 1u) & 1u);
     if (index / partsABox >= boxCount) return;
     Box box = boxes[firstBox + index / partsABox];
-    uvec3 low = unpack(box.low), size = unpack(box.last) - low + 1u, part = size;
-    // As src/raster/point_scan.cpp counts them.
-    while (part.x * part.y * part.z > PART_POINTS) {
-        if (part.z >= part.x && part.z >= part.y)
-            part.z = (part.z + 1u) / 2u;
-        else if (part.y >= part.x)
-            part.y = (part.y + 1u) / 2u;
-        else
-            part.x = (part.x + 1u) / 2u;
-    }
+    uvec3 low = unpack(box.low), size = unpack(box.last) - low + 1u, part = partSize(size);
     uvec3 count = (size + part - 1u) / part;
     uint i = index % partsABox;
     if (i >= count.x * count.y * count.z) return;

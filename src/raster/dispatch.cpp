@@ -1,0 +1,24 @@
+#include "raster/dispatch.h"
+
+#include <bit>
+
+namespace tessera {
+
+std::string glslOf(double value) {
+    const auto bits = std::bit_cast<std::uint64_t>(value);
+    return "packDouble2x32(uvec2(" + std::to_string(std::uint32_t(bits)) + "u, " +
+           std::to_string(std::uint32_t(bits >> 32)) + "u))";
+}
+
+std::string glslOf(float value) {
+    return "uintBitsToFloat(" + std::to_string(std::bit_cast<std::uint32_t>(value)) + "u)";
+}
+
+GlProgram makeComputeProgram(GlContext& context, const ShaderText& main, std::vector<ShaderText> shared,
+                             std::vector<ShaderDefine> defines) {
+    defines.push_back({"GROUP_THREADS", glslOf(kGroupThreads)});
+    defines.push_back({"GROUPS_A_ROW", glslOf(kGroupsARow)});
+    return makeProgram(context, {{GL_COMPUTE_SHADER, main, std::move(shared)}}, defines);
+}
+
+}  // namespace tessera

@@ -1,0 +1,401 @@
+#include "raster/record_maker.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <random>
+
+#include "base/check.h"
+#include "base/parallel.h"
+#include "index_space/exact_scan.h"
+#include "raster/dispatch.h"
+#include "raster/shaders.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr std::uint32_t kDecidedBit = 1u << 31;
+constexpr std::size_t kFan = 32;  ///< of the levels of sums
+constexpr std::size_t kOperations = 8, kOperands = 4096;
+constexpr std::size_t kRunCounts = 2 * (kPartSizes + 1) + 1;
+
+void grow(GlContext& context, GlBuffer& buffer, std::size_t bytes) {
+    if (buffer && buffer.bytes() >= std::int64_t(bytes)) return;
+    buffer = GlBuffer();  // the old one goes first, for its memory
+    buffer = GlBuffer(context, std::int64_t(bytes + bytes / 4), 0);
+}
+
+void clear(GlContext& context, const GlBuffer& buffer, std::size_t bytes) {
+    context.functions().ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, GLsizeiptr(bytes), GL_RED_INTEGER,
+                                                GL_UNSIGNED_INT, nullptr);
+}
+
+template <class T>
+std::vector<T> read(GlContext& context, const GlBuffer& buffer, std::size_t first, std::size_t count) {
+    std::vector<T> items(count);
+    context.functions().GetNamedBufferSubData(buffer.id(), GLintptr(first * sizeof(T)),
+                                              GLsizeiptr(count * sizeof(T)), items.data());
+    return items;
+}
+
+/// As shaders compute them.
+void operate(double a, double b, double (&results)[kOperations]) {
+    const double made[kOperations] = {
+        a + b, a - b, a * b, a / b, std::floor(a), std::sqrt(std::fabs(a)), a * b + a, double(float(a))};
+    std::ranges::copy(made, results);
+}
+
+}  // namespace
+
+DeviceMesh::Source::Source(const TetMesh& mesh, std::span<const ChannelCoding> channels, SampleFormat format,
+                           const Execution& execution)
+    : whole(mesh) {
+    const float invalid = sampleMarks(format).invalid;
+    for (std::size_t from = 0; from < std::max<std::size_t>(1, channels.size()); from += kChannelsAPass) {
+        const auto codings = channels.subspan(from, std::min(kChannelsAPass, channels.size() - from));
+        Pass& pass = passes.emplace_back();
+        pass.channels = std::max(1, int(codings.size()));
+        if (codings.empty()) pass.cellMask = 1;  // one that says nothing, of every element
+        for (std::size_t c = 0; c < codings.size(); ++c)
+            pass.cellMask |= unsigned(codings[c].isOfCells()) << c;
+        const auto ofCells = std::size_t(std::popcount(pass.cellMask));
+        const std::size_t ofNodes = std::size_t(pass.channels) - ofCells;
+        pass.nodeCodes.resize(ofNodes * mesh.points.size());
+        pass.cellCodes.resize(ofCells * mesh.tets.size());
+        std::size_t n = 0, k = 0;
+        for (const ChannelCoding& coding : codings) {
+            const bool isOfCells = coding.isOfCells();
+            const std::size_t place = isOfCells ? k++ : n++;
+            parallelForChunks(execution, isOfCells ? mesh.elementCount() : mesh.nodeCount(), 16384,
+                              [&](std::int64_t begin, std::int64_t end) {
+                                  for (std::int64_t i = begin; i < end; ++i)
+                                      if (isOfCells)
+                                          pass.cellCodes[std::size_t(i) * ofCells + place] =
+                                              cellCode(coding, std::int32_t(i), invalid);
+                                      else
+                                          pass.nodeCodes[std::size_t(i) * ofNodes + place] =
+                                              nodeCode(coding, std::int32_t(i));
+                              });
+        }
+    }
+    tets.resize(mesh.tets.size());
+    parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t e = begin; e < end; ++e) {
+            auto& tet = tets[std::size_t(e)];
+            for (std::size_t k = 0; k < 4; ++k) tet[k] = std::uint32_t(mesh.tets[std::size_t(e)][k]);
+            for (const ChannelCoding& coding : channels)
+                if (!isSafeOnDevice(coding, mesh, std::int32_t(e))) tet[0] |= kDecidedBit;
+        }
+    });
+}
+
+DeviceMesh::DeviceMesh(GlContext& context, const Source& source)
+    : nodeCount_(source.whole.points.size()), elementCount_(source.whole.tets.size()) {
+    nodes_ = GlBuffer(context, std::span(source.whole.points));
+    tets_ = GlBuffer(context, std::span(source.tets));
+    for (const Source::Pass& pass : source.passes)
+        passes_.push_back({GlBuffer(context, std::span(pass.nodeCodes)),
+                           GlBuffer(context, std::span(pass.cellCodes)), pass.cellMask, pass.channels});
+}
+
+std::int64_t DeviceMesh::bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels) {
+    std::int64_t aNode = 9 * std::int64_t(sizeof(double)),
+                 anElement = 4 * std::int64_t(sizeof(std::int32_t)) + 1;
+    for (const ChannelCoding& coding : channels)
+        (coding.isOfCells() ? anElement : aNode) +=
+            std::int64_t(coding.isOfCells() ? sizeof(float) : sizeof(NodeCode));
+    return aNode * mesh.nodeCount() + anElement * mesh.elementCount();
+}
+
+std::int64_t DeviceMesh::uploadedBytes() const {
+    std::int64_t bytes = nodes_.bytes() + tets_.bytes();
+    for (const Pass& pass : passes_) bytes += pass.nodeCodes.bytes() + pass.cellCodes.bytes();
+    return bytes;
+}
+
+/// A program in use, whose uniforms are set by name.
+struct RecordMaker::Use {
+    GlContext& context;
+    const GlProgram& program;
+
+    const GlFunctions& gl() const { return context.functions(); }
+    GLint at(const char* name) const { return program.uniform(name); }
+    void bind(GLuint binding, const GlBuffer& buffer) const {
+        gl().BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, buffer.id());
+    }
+    void set(const char* name, std::size_t value) const {
+        gl().ProgramUniform1ui(program.id(), at(name), GLuint(value));
+    }
+    void set(const char* name, const Vec3i& value) const {
+        gl().ProgramUniform3i(program.id(), at(name), value.x, value.y, value.z);
+    }
+    void set(const char* name, const Vec3d& value) const {
+        gl().ProgramUniform3d(program.id(), at(name), value.x, value.y, value.z);
+    }
+    void flag(const char* name, bool value) const { gl().ProgramUniform1i(program.id(), at(name), value); }
+    void run(std::size_t threads) const {
+        const auto groups = groupsOf(threads);
+        gl().UseProgram(program.id());
+        gl().DispatchCompute(groups[0], groups[1], groups[2]);
+        gl().MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    }
+};
+
+const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int channels) {
+    const auto found = programs_.find({stage, channels});
+    if (found != programs_.end()) return found->second;
+    namespace text = shaders::raster;
+    const std::vector<ShaderDefine> defines{
+        {"CHANNELS", std::to_string(channels)},
+        {"PLANE_ROUNDING", glslOf(kPlaneRounding)},
+        {"MOST_PLANE_ERROR", glslOf(kMostPlaneError)},
+        {"LARGEST_HEIGHT", glslOf(kLargestHeight)},
+        {"LARGEST_MARGIN", glslOf(kLargestMargin)},
+        {"LARGEST_FLOAT", glslOf(double(std::numeric_limits<float>::max()))},
+        {"CORNER_FACTOR", glslOf(kCornerFactor)},
+        {"FLOAT_ROUNDING", glslOf(kFloatRounding)},
+        {"FLOAT_UNIT", glslOf(kFloatUnit)},
+        {"SLACK_FACTOR", glslOf(kSlackFactor)},
+        {"CELL_EDGE", glslOf(double(kCellEdge))},
+        {"BOX_SLACK", glslOf(kBoxSlack)},
+        {"SMALL_EXTENT", std::to_string(kSmallExtent)},
+        {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
+        {"PART_SIZES", glslOf(kPartSizes)},
+        {"TILE_SHIFT", std::to_string(kTileShift)},
+        {"TILES_AN_EDGE", glslOf(std::size_t(kTilesAnEdge))},
+        {"TILES", glslOf(kTiles)},
+        {"SMALL_SIZES", glslOf(kSmallSizes)},
+        {"SMALL_BUCKETS", glslOf(kSmallBuckets)},
+        {"BUCKETS", glslOf(kBuckets)},
+        {"FAN", glslOf(kFan)},
+        {"OPERATIONS", glslOf(kOperations)}};
+    const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
+        auto all = defines;
+        if (stage == Stage::thinGeometry) all.push_back({"THIN"});
+        shared.insert(shared.begin(), text::kThreads);
+        return makeComputeProgram(context, main, std::move(shared), std::move(all));
+    };
+    const auto ofStage = [&] {
+        switch (stage) {
+            case Stage::frame:
+                return made(text::kFrameNodes, {});
+            case Stage::near:
+                return made(text::kNearElements, {text::kPlacedNodes});
+            case Stage::sums:
+                return made(text::kPrefixSums, {});
+            case Stage::list:
+                return made(text::kListElements, {});
+            case Stage::easyGeometry:
+            case Stage::thinGeometry:
+                return made(text::kRecordGeometry, {text::kPlacedNodes, text::kElementShape, text::kRanks,
+                                                    text::kScanBoxes, text::kScanBuckets});
+            case Stage::channels:
+                return made(text::kRecordChannels, {text::kPlacedNodes, text::kElementShape, text::kRanks,
+                                                    text::kScanBoxes, text::kScanBuckets});
+            case Stage::sort:
+                return made(text::kSortBoxes, {text::kRanks, text::kScanBoxes, text::kScanBuckets});
+            case Stage::counts:
+                return made(text::kRecordCounts, {});
+            case Stage::doubles:
+                return made(text::kDoubleTest, {});
+        }
+        throw InternalError("no such stage");
+    };
+    return programs_.emplace(std::pair(stage, channels), ofStage()).first->second;
+}
+
+RecordMaker::Use RecordMaker::use(GlContext& context, Stage stage, int channels) {
+    return {context, program(context, stage, channels)};
+}
+
+bool RecordMaker::isExact(GlContext& context) {
+    if (isExact_) return *isExact_;
+    std::mt19937_64 random(1);
+    std::vector<double> operands;
+    for (std::size_t i = 0; i < kOperands; ++i) {
+        const double sign = random() & 1 ? -1 : 1;
+        operands.push_back(sign * std::ldexp(1 + double(random() >> 12) * 0x1p-52, int(random() % 81) - 40));
+    }
+    const GlBuffer source(context, std::span(operands));
+    const GlBuffer results(context, std::int64_t(kOperands * kOperations * sizeof(double)), 0);
+    const Use test = use(context, Stage::doubles);
+    test.bind(0, source);
+    test.bind(1, results);
+    test.set("count", kOperands);
+    test.run(kOperands);
+    const auto made = read<double>(context, results, 0, kOperands * kOperations);
+    isExact_ = true;
+    for (std::size_t i = 0; i < kOperands; ++i) {
+        double expected[kOperations];
+        operate(operands[i], operands[(i + 1) % kOperands], expected);
+        for (std::size_t k = 0; k < kOperations; ++k)
+            if (made[i * kOperations + k] != expected[k]) isExact_ = false;
+    }
+    return *isExact_;
+}
+
+void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice) {
+    TESSERA_CHECK(lattice.isAxisParallel(), "nodes of turned lattices are placed by the processor");
+    grow(context, frame_, mesh.nodeCount_ * 6 * sizeof(double));
+    const Use placing = use(context, Stage::frame);
+    placing.bind(0, mesh.nodes_);
+    placing.bind(1, frame_);
+    placing.set("originWorld", lattice.originWorld);
+    placing.set("spacingWorld", Vec3d(lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z));
+    placing.set("nodeCount", mesh.nodeCount_);
+    placing.run(mesh.nodeCount_);
+}
+
+void RecordMaker::usePlaced(Use& used, const DeviceMesh& mesh) const {
+    used.bind(0, mesh.tets_);
+    used.bind(1, frame_);
+    used.set("regionMin", points_.min);
+    used.set("regionSize", points_.size());
+    used.set("cellMin", cellOrigin(points_));
+    used.set("listedCount", listedCount_);
+}
+
+std::size_t RecordMaker::addUp(GlContext& context, const GlBuffer& items, std::size_t count, bool areBits,
+                               GlBuffer& sums) {
+    struct Level {
+        std::size_t first, count;
+    };
+    std::vector<Level> levels{{0, count}};
+    while (levels.back().count > 1 || levels.size() == 1)
+        levels.push_back(
+            {levels.back().first + levels.back().count, (levels.back().count + kFan - 1) / kFan});
+    grow(context, sums, (levels.back().first + 1) * sizeof(GLuint));
+    const Use adding = use(context, Stage::sums);
+    adding.bind(0, items);
+    adding.bind(1, sums);
+    adding.flag("areBits", areBits);
+    const auto step = [&](std::size_t level, bool isDown) {
+        adding.set("level", levels[level].first);
+        adding.set("nextLevel", levels[level + 1].first);
+        adding.set("count", levels[level].count);
+        adding.flag("isFirst", level == 0);
+        adding.flag("isLast", level + 2 == levels.size());
+        adding.flag("isDown", isDown);
+        adding.run(levels[level + 1].count);
+    };
+    for (std::size_t level = 0; level + 1 < levels.size(); ++level) step(level, false);
+    for (std::size_t level = levels.size() - 1; level-- > 0;) step(level, true);
+    return levels.back().first;
+}
+
+std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, const IndexBox& points) {
+    points_ = points;
+    const std::size_t words = (mesh.elementCount_ + 31) / 32;
+    listedCount_ = 0;
+    if (words == 0) return 0;
+    grow(context, marks_, words * sizeof(GLuint));
+    clear(context, marks_, words * sizeof(GLuint));
+    Use near = use(context, Stage::near);
+    usePlaced(near, mesh);
+    near.bind(2, marks_);
+    near.set("elementCount", mesh.elementCount_);
+    near.run(mesh.elementCount_);
+    const std::size_t total = addUp(context, marks_, words, true, markSums_);
+    listedCount_ = read<GLuint>(context, markSums_, total, 1).front();
+    return std::int64_t(listedCount_);
+}
+
+RecordMaker::Made RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh) {
+    thinCount_ = 0;
+    if (listedCount_ == 0) return {};
+    const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
+    grow(context, listed_, listedCount_ * sizeof(GLuint));
+    const Use list = use(context, Stage::list);
+    list.bind(0, marks_);
+    list.bind(1, markSums_);
+    list.bind(2, listed_);
+    list.set("wordCount", markWords);
+    list.run(markWords);
+
+    grow(context, easyGeometry_, listedCount_ * sizeof(EasyGeometry));
+    grow(context, boxes_, listedCount_ * sizeof(ScanBox));
+    grow(context, sorted_, listedCount_ * sizeof(ScanBox));
+    grow(context, thinMarks_, thinWords * sizeof(GLuint));
+    grow(context, bucketCounts_, (2 * kBuckets + 1) * sizeof(GLuint));
+    grow(context, hard_, (listedCount_ + 1) * sizeof(GLuint));
+    grow(context, counts_, (kRunCounts + 2) * sizeof(GLuint));
+    clear(context, thinMarks_, thinWords * sizeof(GLuint));
+    clear(context, bucketCounts_, (2 * kBuckets + 1) * sizeof(GLuint));
+    clear(context, hard_, sizeof(GLuint));
+    Use easy = use(context, Stage::easyGeometry);
+    usePlaced(easy, mesh);
+    easy.bind(2, listed_);
+    easy.bind(3, easyGeometry_);
+    easy.bind(4, boxes_);
+    easy.bind(5, thinMarks_);
+    easy.bind(6, bucketCounts_);
+    easy.bind(7, hard_);
+    easy.run(listedCount_);
+
+    const std::size_t thinTotal = addUp(context, thinMarks_, thinWords, true, thinSums_);
+    // One more than there are: before the last stand all.
+    addUp(context, bucketCounts_, 2 * kBuckets + 1, false, bucketSums_);
+    const Use count = use(context, Stage::counts);
+    count.bind(0, thinSums_);
+    count.bind(1, hard_);
+    count.bind(2, bucketSums_);
+    count.bind(3, counts_);
+    count.set("thinTotal", thinTotal);
+    count.run(kRunCounts);
+    const auto counts = read<GLuint>(context, counts_, 0, kRunCounts + 2);
+    thinCount_ = counts[0];
+    Made made{listScanRuns(std::span(counts).subspan<2, kRunCounts>()), {}};
+    if (counts[1] > 0) made.hard = read<std::int32_t>(context, hard_, 1, counts[1]);
+    std::ranges::sort(made.hard);
+
+    grow(context, thinGeometry_, std::max<std::size_t>(1, thinCount_) * sizeof(ThinGeometry));
+    if (thinCount_ > 0) {
+        Use thin = use(context, Stage::thinGeometry);
+        usePlaced(thin, mesh);
+        thin.bind(2, listed_);
+        thin.bind(3, thinGeometry_);
+        thin.bind(4, boxes_);
+        thin.bind(5, thinMarks_);
+        thin.bind(6, thinSums_);
+        thin.run(listedCount_);
+    }
+    const Use sort = use(context, Stage::sort);
+    sort.bind(0, boxes_);
+    sort.bind(1, bucketSums_);
+    sort.bind(2, sorted_);
+    sort.set("listedCount", listedCount_);
+    sort.run(listedCount_);
+    return made;
+}
+
+void RecordMaker::makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass,
+                               SampleFormat format) {
+    if (listedCount_ == 0) return;
+    const DeviceMesh::Pass& codes = mesh.passes_.at(pass);
+    const std::size_t anElement = std::size_t(codes.channels) * sizeof(ChannelRecord);
+    grow(context, easyChannels_, listedCount_ * anElement);
+    grow(context, thinChannels_, std::max<std::size_t>(1, thinCount_) * anElement);
+    Use channels = use(context, Stage::channels, codes.channels);
+    usePlaced(channels, mesh);
+    channels.bind(2, listed_);
+    channels.bind(3, boxes_);
+    channels.bind(4, codes.nodeCodes);
+    channels.bind(5, codes.cellCodes);
+    channels.bind(6, easyChannels_);
+    channels.bind(7, thinChannels_);
+    channels.set("cellMask", codes.cellMask);
+    context.functions().ProgramUniform1f(channels.program.id(), channels.at("invalid"),
+                                         sampleMarks(format).invalid);
+    channels.run(listedCount_);
+}
+
+ScanRecords RecordMaker::records() const {
+    return {easyGeometry_.id(), easyChannels_.id(), thinGeometry_.id(), thinChannels_.id(), sorted_.id(), {}};
+}
+
+std::vector<std::int32_t> RecordMaker::listed(GlContext& context) const {
+    return read<std::int32_t>(context, listed_, 0, listedCount_);
+}
+
+}  // namespace tessera

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "gl/gl_program.h"
+#include "raster/point_scan.h"
+#include "raster/prepared_region.h"
+
+namespace tessera {
+
+/// Nodes, elements and coded values of a mesh in the device's memory. To be made and destroyed on the
+/// device's OpenGL thread.
+class DeviceMesh {
+  public:
+    /// What of a mesh the processor prepares, on any thread.
+    struct Source {
+        /// @param channels of whole fields. Elements that isSafeOnDevice() refuses are marked.
+        Source(const TetMesh& mesh, std::span<const ChannelCoding> channels, SampleFormat format,
+               const Execution& execution);
+
+        struct Pass {
+            std::vector<NodeCode> nodeCodes;  ///< node by node, channel by channel
+            std::vector<float> cellCodes;
+            std::uint32_t cellMask = 0;  ///< a bit a channel: it is of cells
+            int channels = 1;
+        };
+        const TetMesh& whole;
+        UninitializedVector<std::array<std::uint32_t, 4>> tets;
+        std::vector<Pass> passes;
+    };
+    DeviceMesh(GlContext& context, const Source& source);
+
+    /// On the device, with what it takes to place the nodes in a lattice; not what regions take.
+    static std::int64_t bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels);
+    std::int64_t uploadedBytes() const;
+
+  private:
+    friend class RecordMaker;
+    struct Pass {
+        GlBuffer nodeCodes, cellCodes;
+        std::uint32_t cellMask;
+        int channels;
+    };
+    std::size_t nodeCount_, elementCount_;
+    GlBuffer nodes_, tets_;
+    std::vector<Pass> passes_;
+};
+
+/// What a scan goes through, in buffers of the device.
+struct ScanRecords {
+    GLuint easyGeometry = 0, easyChannels = 0, thinGeometry = 0, thinChannels = 0, boxes = 0;
+    std::vector<ScanRun> runs;
+};
+
+/// Makes the records and boxes of a region by compute shaders, from a mesh that is on the device: those that
+/// prepareRegion() and listScanBoxes() make, bit for bit, but that boxes aren't tightened and records of easy
+/// elements stand in gaps. All functions run on the device's OpenGL thread.
+class RecordMaker {
+  public:
+    /// Whether operations on doubles give the bits of the processor's, as the records need it.
+    bool isExact(GlContext& context);
+
+    /// Places the mesh's nodes in an axis-parallel lattice, for all regions that follow.
+    void place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice);
+
+    /// Lists the elements that may have points in a region of at most kCellEdge points an axis; returns how
+    /// many there are.
+    std::int64_t findNear(GlContext& context, const DeviceMesh& mesh, const IndexBox& points);
+
+    struct Made {
+        std::vector<ScanRun> runs;
+        std::vector<std::int32_t> hard;  ///< elements, ascending
+    };
+    /// The records of those elements but their channels.
+    Made makeGeometry(GlContext& context, const DeviceMesh& mesh);
+    void makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass, SampleFormat format);
+    /// Of the last region, without its runs.
+    ScanRecords records() const;
+    /// The elements that it lists, ascending; for tests.
+    std::vector<std::int32_t> listed(GlContext& context) const;
+
+  private:
+    enum class Stage { frame, near, sums, list, easyGeometry, thinGeometry, channels, sort, counts, doubles };
+    struct Use;
+    const GlProgram& program(GlContext& context, Stage stage, int channels = 0);
+    Use use(GlContext& context, Stage stage, int channels = 0);
+    void usePlaced(Use& used, const DeviceMesh& mesh) const;
+    /// Makes sums of all items before each; the sum of all stands behind them, at the place that is returned.
+    std::size_t addUp(GlContext& context, const GlBuffer& items, std::size_t count, bool areBits,
+                      GlBuffer& sums);
+
+    std::map<std::pair<Stage, int>, GlProgram> programs_;
+    std::optional<bool> isExact_;
+    GlBuffer frame_;
+    GlBuffer marks_, markSums_, listed_;
+    GlBuffer easyGeometry_, easyChannels_, thinGeometry_, thinChannels_;
+    GlBuffer boxes_, sorted_, thinMarks_, thinSums_, bucketCounts_, bucketSums_, hard_, counts_;
+    IndexBox points_;
+    std::size_t listedCount_ = 0, thinCount_ = 0;
+};
+
+}  // namespace tessera

@@ -1,0 +1,36 @@
+// Nodes in the index space of an axis-parallel lattice, a thread a node, as src/index_space/node_kernel.cpp does it.
+layout(std430, binding = 0) readonly buffer Nodes {
+    double nodesWorld[];  // x, y, z
+};
+layout(std430, binding = 1) writeonly buffer Frame {
+    double frame[];  // the whole voxels of x, y, z, and the rest
+};
+uniform dvec3 originWorld, spacingWorld;
+uniform uint nodeCount;
+
+// t - whole h, rounded once: the product is split into two doubles, and t is near it.
+dvec3 remainder(dvec3 t, dvec3 whole, dvec3 h) {
+    const double kSplit = 134217729.0LF;  // 2^27 + 1
+    precise dvec3 product = whole * h;
+    precise dvec3 w = kSplit * whole, wHigh = w - (w - whole), wLow = whole - wHigh;
+    precise dvec3 v = kSplit * h, hHigh = v - (v - h), hLow = h - hHigh;
+    precise dvec3 rest = ((wHigh * hHigh - product) + wHigh * hLow + wLow * hHigh) + wLow * hLow;
+    precise dvec3 result = (t - product) - rest;
+    return result;
+}
+
+void main() {
+    uint node = threadIndex();
+    if (node >= nodeCount) return;
+    precise dvec3 place = dvec3(nodesWorld[3u * node], nodesWorld[3u * node + 1u], nodesWorld[3u * node + 2u]);
+    precise dvec3 t = place - originWorld;
+    precise dvec3 back = t - place;
+    precise dvec3 tail = (place - (t - back)) - (originWorld + back);
+    precise dvec3 quotient = t / spacingWorld;
+    precise dvec3 whole = floor(quotient);
+    precise dvec3 part = (remainder(t, whole, spacingWorld) + tail) / spacingWorld;
+    for (int a = 0; a < 3; ++a) {
+        frame[6u * node + uint(a)] = whole[a];
+        frame[6u * node + 3u + uint(a)] = part[a];
+    }
+}

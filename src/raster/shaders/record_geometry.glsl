@@ -1,0 +1,92 @@
+// Records of the listed elements' geometry and their boxes, a thread an element: of easy elements where they stand
+// in the list, and with THIN those of thin ones, ascending.
+#ifdef THIN
+#define Real double
+#define Real4 dvec4
+#else
+#define Real float
+#define Real4 vec4
+#endif
+struct Geometry {
+    Real4 nx, ny, nz, offset;
+    vec4 base;
+};
+layout(std430, binding = 2) readonly buffer Listed {
+    uint listed[];
+};
+layout(std430, binding = 3) writeonly buffer Geometries {
+    Geometry geometries[];
+};
+layout(std430, binding = 4) buffer Boxes {
+    Box boxes[];
+};
+layout(std430, binding = 5) buffer ThinMarks {
+    uint thinMarks[];
+};
+#ifdef THIN
+layout(std430, binding = 6) readonly buffer ThinSums {
+    uint thinSums[];
+};
+#else
+layout(std430, binding = 6) buffer BucketCounts {
+    uint bucketCounts[];
+};
+layout(std430, binding = 7) buffer HardElements {
+    uint hardCount;
+    uint hard[];
+};
+#endif
+uniform uint listedCount;
+
+Geometry recordOf(Placed placed, Shape shape) {
+    dvec3 base = baseOf(placed);
+    Real4 nx, ny, nz, offset;
+    for (int face = 0; face < 4; ++face) {
+        dvec3 n = shape.normal[face];
+        precise double at = shape.offset[face] + n.x * base.x + n.y * base.y + n.z * base.z;
+        nx[face] = Real(n.x);
+        ny[face] = Real(n.y);
+        nz[face] = Real(n.z);
+        offset[face] = Real(at);
+    }
+    precise dvec3 place = placed.first + base - dvec3(regionMin);
+    precise float slack = float(shape.slack) * SLACK_FACTOR;
+    return Geometry(nx, ny, nz, offset, vec4(vec3(place), slack));
+}
+
+void main() {
+    uint slot = threadIndex();
+    if (slot >= listedCount) return;
+    uint element = listed[slot];
+    uvec4 tet = tets[element];
+#ifdef THIN
+    uint rank = boxes[slot].rank, word = slot >> 5, bit = 1u << (slot & 31u);
+    if (rank == kNoBox || rank >> (kKindShift + 1u) == 0u) return;
+    uint to = thinSums[word] + uint(bitCount(thinMarks[word] & (bit - 1u)));
+    Placed placed = placeNodes(tet);
+    geometries[to] = recordOf(placed, shapeElement(placed));
+    boxes[slot].rank = (rank & ~kPlaceMask) | to;
+#else
+    boxes[slot].rank = kNoBox;
+    bool isDecided = (tet.x & kDecidedBit) != 0u;
+    tet.x &= ~kDecidedBit;
+    Placed placed = placeNodes(tet);
+    Shape shape = shapeElement(placed);
+    ivec3 low, end;
+    pointsAbout(placed, BOX_SLACK + shape.margin, low, end);
+    if (!all(lessThan(low, end))) return;
+    if (isDecided || shape.grade == kHard) {
+        hard[atomicAdd(hardCount, 1u)] = element;
+        return;
+    }
+    bool isSmall = all(lessThanEqual(placed.high - placed.low, dvec3(SMALL_EXTENT)));
+    uint kind = (shape.grade == kThin ? 2u : 0u) + (isSmall ? 0u : 1u);
+    Box box = Box(kind << kKindShift | slot, pack(uvec3(low)), pack(uvec3(end - 1)));
+    boxes[slot] = box;
+    atomicAdd(bucketCounts[bucketOf(box)], 1u);
+    if (shape.grade == kThin)
+        atomicOr(thinMarks[slot >> 5], 1u << (slot & 31u));
+    else
+        geometries[slot] = recordOf(placed, shape);
+#endif
+}
