@@ -44,7 +44,7 @@ RasterBudget shareOut(std::int64_t workBytes, int channels) {
     // The last eighth is for blocks that are put together and for what an emulated device keeps of
     // primitives.
     return {std::int64_t(bytes / 2 / pointBytes), std::int64_t(bytes / 4 / elementBytes),
-            std::int64_t(bytes / 8)};
+            std::int64_t(bytes / 4), std::int64_t(bytes / 8)};
 }
 
 std::int64_t primitiveBytes(const SlabInput& input) {

@@ -20,6 +20,7 @@ WorkMemory rasterWorkMemory(int channels);
 struct RasterBudget {
     std::int64_t regionPoints = 0;    ///< of a region: its target, and images of two regions
     std::int64_t regionElements = 0;  ///< of a region: records of two regions, here and on the device
+    std::int64_t recordBytes = 0;     ///< of records that the device makes, of one region
     std::int64_t queueBytes = 0;      ///< primitives that wait for the device
 };
 

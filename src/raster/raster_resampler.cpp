@@ -317,17 +317,24 @@ bool BoundRaster::Run::cut(const RasterRegion& region, std::int64_t pieces) {
 
 RecordMaker::Made BoundRaster::Run::makeRecords(RegionJob& job) {
     RecordMaker& maker = device_.records();
+    const int channels = std::min(int(channels_.size()), int(kChannelsAPass));
     for (;;) {
         job.region = std::move(left_.front());
         left_.pop_front();
         const IndexBox points = job.prepared.points = job.region.points;
         const std::int64_t near = device_.thread().run(
             [&](GlContext& context) { return maker.findNear(context, *deviceMesh_, points); });
-        if (near > budget_.regionElements && cut(job.region, 1 + (near - 1) / budget_.regionElements))
-            continue;
+        const std::int64_t bytes = RecordMaker::bytesFor(near, 0, channels);
+        if (bytes > budget_.recordBytes && cut(job.region, 1 + bytes / budget_.recordBytes)) continue;
+        const auto make = [&](std::int64_t most) {
+            return device_.thread().run(
+                [&](GlContext& context) { return maker.makeGeometry(context, *deviceMesh_, most); });
+        };
+        std::optional<RecordMaker::Made> made = make(budget_.recordBytes);
+        if (!made && cut(job.region, 2)) continue;
+        if (!made) made = make(std::numeric_limits<std::int64_t>::max());
         statistics_.add(counted::elementBlockPairs, near);
-        return device_.thread().run(
-            [&](GlContext& context) { return maker.makeGeometry(context, *deviceMesh_); });
+        return *std::move(made);
     }
 }
 

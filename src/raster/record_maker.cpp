@@ -100,7 +100,7 @@ DeviceMesh::DeviceMesh(GlContext& context, const Source& source)
 }
 
 std::int64_t DeviceMesh::bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels) {
-    std::int64_t aNode = 9 * std::int64_t(sizeof(double)),
+    std::int64_t aNode = 11 * std::int64_t(sizeof(double)),
                  anElement = 4 * std::int64_t(sizeof(std::int32_t)) + 1;
     for (const ChannelCoding& coding : channels)
         (coding.isOfCells() ? anElement : aNode) +=
@@ -159,6 +159,8 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
         {"SLACK_FACTOR", glslOf(kSlackFactor)},
         {"CELL_EDGE", glslOf(double(kCellEdge))},
         {"BOX_SLACK", glslOf(kBoxSlack)},
+        {"MARGIN", glslOf(float(2 * kLargestMargin))},
+        {"ROUGH", glslOf(0x1p-21f)},
         {"SMALL_EXTENT", std::to_string(kSmallExtent)},
         {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
         {"PART_SIZES", glslOf(kPartSizes)},
@@ -181,7 +183,7 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
             case Stage::frame:
                 return made(text::kFrameNodes, {});
             case Stage::near:
-                return made(text::kNearElements, {text::kPlacedNodes});
+                return made(text::kNearElements, {});
             case Stage::sums:
                 return made(text::kPrefixSums, {});
             case Stage::list:
@@ -238,9 +240,11 @@ bool RecordMaker::isExact(GlContext& context) {
 void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice) {
     TESSERA_CHECK(lattice.isAxisParallel(), "nodes of turned lattices are placed by the processor");
     grow(context, frame_, mesh.nodeCount_ * 6 * sizeof(double));
+    grow(context, rough_, mesh.nodeCount_ * 4 * sizeof(float));
     const Use placing = use(context, Stage::frame);
     placing.bind(0, mesh.nodes_);
     placing.bind(1, frame_);
+    placing.bind(2, rough_);
     placing.set("originWorld", lattice.originWorld);
     placing.set("spacingWorld", Vec3d(lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z));
     placing.set("nodeCount", mesh.nodeCount_);
@@ -291,19 +295,35 @@ std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, c
     if (words == 0) return 0;
     grow(context, marks_, words * sizeof(GLuint));
     clear(context, marks_, words * sizeof(GLuint));
-    Use near = use(context, Stage::near);
-    usePlaced(near, mesh);
+    const Use near = use(context, Stage::near);
+    near.bind(0, mesh.tets_);
+    near.bind(1, rough_);
     near.bind(2, marks_);
     near.set("elementCount", mesh.elementCount_);
+    const auto setPlace = [&](const char* name, const Vec3i& place) {
+        context.functions().ProgramUniform3f(near.program.id(), near.at(name), float(place.x), float(place.y),
+                                             float(place.z));
+    };
+    setPlace("lowest", points.min);
+    setPlace("highest", points.max - 1);
     near.run(mesh.elementCount_);
     const std::size_t total = addUp(context, marks_, words, true, markSums_);
     listedCount_ = read<GLuint>(context, markSums_, total, 1).front();
     return std::int64_t(listedCount_);
 }
 
-RecordMaker::Made RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh) {
+std::int64_t RecordMaker::bytesFor(std::int64_t listed, std::int64_t thin, int channels) {
+    const std::int64_t ofChannels = std::int64_t(sizeof(ChannelRecord)) * std::max(1, channels);
+    const auto easy = std::int64_t(2 * sizeof(std::int32_t) + 2 * sizeof(ScanBox) + sizeof(EasyGeometry));
+    const std::int64_t bytes =
+        listed * (easy + ofChannels) + thin * (std::int64_t(sizeof(ThinGeometry)) + ofChannels);
+    return bytes + bytes / 4;  // buffers are made larger than is needed at once
+}
+
+std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh,
+                                                           std::int64_t most) {
     thinCount_ = 0;
-    if (listedCount_ == 0) return {};
+    if (listedCount_ == 0) return Made{};
     const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
     grow(context, listed_, listedCount_ * sizeof(GLuint));
     const Use list = use(context, Stage::list);
@@ -345,6 +365,8 @@ RecordMaker::Made RecordMaker::makeGeometry(GlContext& context, const DeviceMesh
     count.run(kRunCounts);
     const auto counts = read<GLuint>(context, counts_, 0, kRunCounts + 2);
     thinCount_ = counts[0];
+    const int channels = mesh.passes_.front().channels;  // no pass has more
+    if (bytesFor(std::int64_t(listedCount_), std::int64_t(thinCount_), channels) > most) return std::nullopt;
     Made made{listScanRuns(std::span(counts).subspan<2, kRunCounts>()), {}};
     if (counts[1] > 0) made.hard = read<std::int32_t>(context, hard_, 1, counts[1]);
     std::ranges::sort(made.hard);

@@ -75,8 +75,11 @@ class RecordMaker {
         std::vector<ScanRun> runs;
         std::vector<std::int32_t> hard;  ///< elements, ascending
     };
-    /// The records of those elements but their channels.
-    Made makeGeometry(GlContext& context, const DeviceMesh& mesh);
+    /// The records of those elements but their channels. Null when thin ones make it more bytes, with the
+    /// channels, than `most`.
+    std::optional<Made> makeGeometry(GlContext& context, const DeviceMesh& mesh, std::int64_t most);
+    /// What records take when `listed` elements are listed.
+    static std::int64_t bytesFor(std::int64_t listed, std::int64_t thin, int channels);
     void makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass, SampleFormat format);
     /// Of the last region, without its runs.
     ScanRecords records() const;
@@ -95,7 +98,7 @@ class RecordMaker {
 
     std::map<std::pair<Stage, int>, GlProgram> programs_;
     std::optional<bool> isExact_;
-    GlBuffer frame_;
+    GlBuffer frame_, rough_;
     GlBuffer marks_, markSums_, listed_;
     GlBuffer easyGeometry_, easyChannels_, thinGeometry_, thinChannels_;
     GlBuffer boxes_, sorted_, thinMarks_, thinSums_, bucketCounts_, bucketSums_, hard_, counts_;

@@ -52,7 +52,7 @@ DeviceRecords recordsOf(RasterDevice& device, const RasterInputs& inputs, const 
         EXPECT_TRUE(maker.isExact(context));
         maker.place(context, mesh, lattice);
         maker.findNear(context, mesh, box);
-        RecordMaker::Made made = maker.makeGeometry(context, mesh);
+        RecordMaker::Made made = maker.makeGeometry(context, mesh, std::int64_t(1) << 40).value();
         maker.makeChannels(context, mesh, pass, inputs.format);
         const ScanRecords ids = maker.records();
         DeviceRecords records;

@@ -5,6 +5,9 @@ layout(std430, binding = 0) readonly buffer Nodes {
 layout(std430, binding = 1) writeonly buffer Frame {
     double frame[];  // the whole voxels of x, y, z, and the rest
 };
+layout(std430, binding = 2) writeonly buffer Rough {
+    vec4 rough[];  // rounded places
+};
 uniform dvec3 originWorld, spacingWorld;
 uniform uint nodeCount;
 
@@ -29,6 +32,7 @@ void main() {
     precise dvec3 quotient = t / spacingWorld;
     precise dvec3 whole = floor(quotient);
     precise dvec3 part = (remainder(t, whole, spacingWorld) + tail) / spacingWorld;
+    rough[node] = vec4(vec3(whole + part), 0.0);
     for (int a = 0; a < 3; ++a) {
         frame[6u * node + uint(a)] = whole[a];
         frame[6u * node + 3u + uint(a)] = part[a];
