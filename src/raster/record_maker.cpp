@@ -160,6 +160,7 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
         {"CELL_EDGE", glslOf(double(kCellEdge))},
         {"BOX_SLACK", glslOf(kBoxSlack)},
         {"MARGIN", glslOf(float(2 * kLargestMargin))},
+        {"ROUGH_ERROR", glslOf(0x1p-16f)},
         {"ROUGH", glslOf(0x1p-21f)},
         {"SMALL_EXTENT", std::to_string(kSmallExtent)},
         {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
@@ -322,7 +323,7 @@ std::int64_t RecordMaker::bytesFor(std::int64_t listed, std::int64_t thin, int c
 
 std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh,
                                                            std::int64_t most) {
-    thinCount_ = 0;
+    easyCount_ = thinCount_ = 0;
     if (listedCount_ == 0) return Made{};
     const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
     grow(context, listed_, listedCount_ * sizeof(GLuint));
@@ -371,23 +372,28 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
     if (counts[1] > 0) made.hard = read<std::int32_t>(context, hard_, 1, counts[1]);
     std::ranges::sort(made.hard);
 
-    grow(context, thinGeometry_, std::max<std::size_t>(1, thinCount_) * sizeof(ThinGeometry));
-    if (thinCount_ > 0) {
-        Use thin = use(context, Stage::thinGeometry);
-        usePlaced(thin, mesh);
-        thin.bind(2, listed_);
-        thin.bind(3, thinGeometry_);
-        thin.bind(4, boxes_);
-        thin.bind(5, thinMarks_);
-        thin.bind(6, thinSums_);
-        thin.run(listedCount_);
-    }
     const Use sort = use(context, Stage::sort);
     sort.bind(0, boxes_);
     sort.bind(1, bucketSums_);
     sort.bind(2, sorted_);
     sort.set("listedCount", listedCount_);
     sort.run(listedCount_);
+
+    easyCount_ = counts[2 + kPartSizes + 1];
+    grow(context, thinGeometry_, std::max<std::size_t>(1, thinCount_) * sizeof(ThinGeometry));
+    grow(context, thinSlots_, std::max<std::size_t>(1, thinCount_) * sizeof(GLuint));
+    if (thinCount_ == 0) return made;
+    Use thin = use(context, Stage::thinGeometry);
+    usePlaced(thin, mesh);
+    thin.bind(2, listed_);
+    thin.bind(3, thinGeometry_);
+    thin.bind(4, sorted_);
+    thin.bind(5, thinMarks_);
+    thin.bind(6, thinSums_);
+    thin.bind(7, thinSlots_);
+    thin.set("firstBox", easyCount_);
+    thin.set("boxCount", thinCount_);
+    thin.run(thinCount_);
     return made;
 }
 
@@ -401,15 +407,21 @@ void RecordMaker::makeChannels(GlContext& context, const DeviceMesh& mesh, std::
     Use channels = use(context, Stage::channels, codes.channels);
     usePlaced(channels, mesh);
     channels.bind(2, listed_);
-    channels.bind(3, boxes_);
+    channels.bind(3, sorted_);
     channels.bind(4, codes.nodeCodes);
     channels.bind(5, codes.cellCodes);
-    channels.bind(6, easyChannels_);
-    channels.bind(7, thinChannels_);
+    channels.bind(7, thinSlots_);
     channels.set("cellMask", codes.cellMask);
     context.functions().ProgramUniform1f(channels.program.id(), channels.at("invalid"),
                                          sampleMarks(format).invalid);
-    channels.run(listedCount_);
+    for (const bool areThin : {false, true}) {
+        const std::size_t count = areThin ? thinCount_ : easyCount_;
+        if (count == 0) continue;
+        channels.bind(6, areThin ? thinChannels_ : easyChannels_);
+        channels.set("elementCount", count);
+        channels.flag("areThin", areThin);
+        channels.run(count);
+    }
 }
 
 ScanRecords RecordMaker::records() const {

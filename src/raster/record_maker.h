@@ -101,9 +101,9 @@ class RecordMaker {
     GlBuffer frame_, rough_;
     GlBuffer marks_, markSums_, listed_;
     GlBuffer easyGeometry_, easyChannels_, thinGeometry_, thinChannels_;
-    GlBuffer boxes_, sorted_, thinMarks_, thinSums_, bucketCounts_, bucketSums_, hard_, counts_;
+    GlBuffer boxes_, sorted_, thinMarks_, thinSums_, thinSlots_, bucketCounts_, bucketSums_, hard_, counts_;
     IndexBox points_;
-    std::size_t listedCount_ = 0, thinCount_ = 0;
+    std::size_t listedCount_ = 0, easyCount_ = 0, thinCount_ = 0;
 };
 
 }  // namespace tessera

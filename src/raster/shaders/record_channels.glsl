@@ -1,4 +1,4 @@
-// Records of the listed elements' channels, a thread an element, as src/raster/channel_coding.cpp makes them.
+// Records of channels, a thread an element: of easy ones by their boxes, or of thin ones; as src/raster/channel_coding.cpp makes them.
 struct Channel {
     vec4 gradient, values;
 };
@@ -22,10 +22,11 @@ layout(std430, binding = 5) readonly buffer CellCodes {
 layout(std430, binding = 6) writeonly buffer Channels {
     Channel channels[];
 };
-layout(std430, binding = 7) writeonly buffer ThinChannels {
-    Channel thinChannels[];
+layout(std430, binding = 7) readonly buffer ThinSlots {
+    uint thinSlots[];
 };
-uniform uint listedCount;
+uniform uint elementCount;
+uniform bool areThin;
 uniform uint cellMask;  // a bit a channel: it is of cells
 uniform float invalid;
 
@@ -34,10 +35,9 @@ float asFloat(double value) {
 }
 
 void main() {
-    uint slot = threadIndex();
-    if (slot >= listedCount) return;
-    uint rank = boxes[slot].rank;
-    if (rank == kNoBox) return;
+    uint index = threadIndex();
+    if (index >= elementCount) return;
+    uint slot = areThin ? thinSlots[index] : boxes[index].rank & kPlaceMask;
     uint element = listed[slot];
     uvec4 tet = tets[element];
     Placed placed = placeNodes(tet);
@@ -74,10 +74,6 @@ void main() {
                 made.values.z = max(max(codes[0].rounded, codes[1].rounded), max(codes[2].rounded, codes[3].rounded));
             }
         }
-        uint to = (rank & kPlaceMask) * uint(CHANNELS) + channel;
-        if (rank >> (kKindShift + 1u) == 0u)
-            channels[to] = made;
-        else
-            thinChannels[to] = made;
+        channels[(areThin ? index : slot) * uint(CHANNELS) + channel] = made;
     }
 }

@@ -1,5 +1,5 @@
 // Records of the listed elements' geometry and their boxes, a thread an element: of easy elements where they stand
-// in the list, and with THIN those of thin ones, ascending.
+// in the list, and with THIN those of thin ones, ascending, a thread a box.
 #ifdef THIN
 #define Real double
 #define Real4 dvec4
@@ -27,6 +27,10 @@ layout(std430, binding = 5) buffer ThinMarks {
 layout(std430, binding = 6) readonly buffer ThinSums {
     uint thinSums[];
 };
+layout(std430, binding = 7) writeonly buffer ThinSlots {
+    uint thinSlots[];  // where thin elements stand in the list
+};
+uniform uint firstBox, boxCount;
 #else
 layout(std430, binding = 6) buffer BucketCounts {
     uint bucketCounts[];
@@ -54,19 +58,23 @@ Geometry recordOf(Placed placed, Shape shape) {
     return Geometry(nx, ny, nz, offset, vec4(vec3(place), slack));
 }
 
+#ifdef THIN
+void main() {
+    uint index = firstBox + threadIndex();
+    if (threadIndex() >= boxCount) return;
+    uint rank = boxes[index].rank, slot = rank & kPlaceMask, word = slot >> 5, bit = 1u << (slot & 31u);
+    uint to = thinSums[word] + uint(bitCount(thinMarks[word] & (bit - 1u)));
+    Placed placed = placeNodes(tets[listed[slot]]);
+    geometries[to] = recordOf(placed, shapeElement(placed));
+    boxes[index].rank = (rank & ~kPlaceMask) | to;
+    thinSlots[to] = slot;
+}
+#else
 void main() {
     uint slot = threadIndex();
     if (slot >= listedCount) return;
     uint element = listed[slot];
     uvec4 tet = tets[element];
-#ifdef THIN
-    uint rank = boxes[slot].rank, word = slot >> 5, bit = 1u << (slot & 31u);
-    if (rank == kNoBox || rank >> (kKindShift + 1u) == 0u) return;
-    uint to = thinSums[word] + uint(bitCount(thinMarks[word] & (bit - 1u)));
-    Placed placed = placeNodes(tet);
-    geometries[to] = recordOf(placed, shapeElement(placed));
-    boxes[slot].rank = (rank & ~kPlaceMask) | to;
-#else
     boxes[slot].rank = kNoBox;
     bool isDecided = (tet.x & kDecidedBit) != 0u;
     tet.x &= ~kDecidedBit;
@@ -88,5 +96,5 @@ void main() {
         atomicOr(thinMarks[slot >> 5], 1u << (slot & 31u));
     else
         geometries[slot] = recordOf(placed, shape);
-#endif
 }
+#endif
