@@ -52,9 +52,7 @@ struct Times {
 
 template <class Work>
 Times timed(GlThread& thread, Work work) {
-    const auto processor = [&] {
-        return threadMs() + thread.run([](GlContext&) { return threadMs(); });
-    };
+    const auto processor = [&] { return threadMs() + thread.run([](GlContext&) { return threadMs(); }); };
     Times times;
     const double before = processor();
     const Timer timer;
@@ -112,8 +110,8 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
     };
     std::vector<Case> cases;
     for (const int points : options.points)
-        cases.push_back({fmt::format("{}^3", points), latticeOf(mesh, points),
-                         {IndexBox{Vec3i(0), Vec3i(points)}}});
+        cases.push_back(
+            {fmt::format("{}^3", points), latticeOf(mesh, points), {IndexBox{Vec3i(0), Vec3i(points)}}});
     cases.push_back({"64 x 16^3", latticeOf(mesh, 256), bricksAboutMiddle()});
     json rows = json::array();
     for (const Case& one : cases) {
@@ -134,12 +132,12 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
             all.push_back({algorithm, resampler.bind(mesh, fields, bind), 0, {}, {}});
             all.back().bindMs = timer.elapsedMs();
         }
-        for (int run = -1; run < options.runs; ++run)  // the first compiles shaders and puts meshes on the device
+        for (int run = -1; run < options.runs;
+             ++run)  // the first compiles shaders and puts meshes on the device
             for (Row& row : all) {
                 const BlockSink nobody = [](std::size_t, const Block&) {};
-                const Times blocks = timed(thread, [&] {
-                    return row.bound->resample(one.lattice, one.boxes, nobody, execution);
-                });
+                const Times blocks = timed(
+                    thread, [&] { return row.bound->resample(one.lattice, one.boxes, nobody, execution); });
                 const Times device = timed(thread, [&] {
                     return row.bound->resampleToDevice(one.lattice, one.boxes, *slots, execution);
                 });
@@ -149,10 +147,10 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
             }
         for (const Row& row : all) {
             const json blocks = median(row.blocks), device = median(row.device);
-            fmt::print("{:<10} {:>10} {:>9.1f} {:>13.2f} {:>13.2f} {:>13.2f} {:>13.2f} {:>11.0f}\n", row.algorithm,
-                       one.name, row.bindMs, blocks["wall_ms"].get<double>(), device["wall_ms"].get<double>(),
-                       device["render_ms"].get<double>(), device["processor_ms"].get<double>(),
-                       device["upload_bytes"].get<double>());
+            fmt::print("{:<10} {:>10} {:>9.1f} {:>13.2f} {:>13.2f} {:>13.2f} {:>13.2f} {:>11.0f}\n",
+                       row.algorithm, one.name, row.bindMs, blocks["wall_ms"].get<double>(),
+                       device["wall_ms"].get<double>(), device["render_ms"].get<double>(),
+                       device["processor_ms"].get<double>(), device["upload_bytes"].get<double>());
             rows.push_back({{"algorithm", row.algorithm},
                             {"points", one.name},
                             {"bind_ms", row.bindMs},
@@ -168,12 +166,14 @@ int run(const Options& options) {
     if (!options.target.empty()) wanted = parseGlPlatform(options.target);
     GlThread& thread = sharedGlThread(chooseGlPlatform(wanted));
     const GlDeviceInfo& info = thread.info();
-    fmt::print("{} by {}, {}\n{}{}, {} threads of the processor; milliseconds, medians of {} interleaved runs\n",
-               info.renderer, info.vendor, info.version, info.platformDetail,
-               info.isSoftware ? " (the processor emulates it)" : "",
-               options.threads > 0 ? options.threads : int(std::thread::hardware_concurrency()), options.runs);
-    json report{{"renderer", info.renderer}, {"vendor", info.vendor},          {"version", info.version},
-                {"platform", nameOf(info.platform)}, {"emulated", info.isSoftware}, {"runs", options.runs},
+    fmt::print(
+        "{} by {}, {}\n{}{}, {} threads of the processor; milliseconds, medians of {} interleaved runs\n",
+        info.renderer, info.vendor, info.version, info.platformDetail,
+        info.isSoftware ? " (the processor emulates it)" : "",
+        options.threads > 0 ? options.threads : int(std::thread::hardware_concurrency()), options.runs);
+    json report{{"renderer", info.renderer},   {"vendor", info.vendor},
+                {"version", info.version},     {"platform", nameOf(info.platform)},
+                {"emulated", info.isSoftware}, {"runs", options.runs},
                 {"meshes", json::array()}};
     for (const int elements : options.elements)
         report["meshes"].push_back(

@@ -9,8 +9,10 @@
 #include <tuple>
 
 #include "brick_test_meshes.h"
+#include "compute/compute_resampler.h"
 #include "gl/gl_program.h"
 #include "gl_test_tools.h"
+#include "hybrid/hybrid_resampler.h"
 #include "pool/face_steps.h"
 #include "refine/plan_frame.h"
 #include "refine/resample_tree.h"
@@ -37,7 +39,21 @@ TetMesh meshWithFields(TetMesh mesh) {
     return mesh;
 }
 
-enum class Algorithm { software, slicing };
+enum class Algorithm { software, slicing, hybrid, compute };
+constexpr std::string_view kNames[] = {"software", "slicing", "hybrid", "compute"};
+
+std::unique_ptr<Resampler> make(Algorithm algorithm) {
+    switch (algorithm) {
+        case Algorithm::slicing:
+            return std::make_unique<SlicingResampler>();
+        case Algorithm::hybrid:
+            return std::make_unique<HybridResampler>();
+        case Algorithm::compute:
+            return std::make_unique<ComputeResampler>();
+        default:
+            return std::make_unique<SoftwareResampler>();
+    }
+}
 
 struct Setting {
     SampleFormat format = SampleFormat::r32f;
@@ -57,15 +73,12 @@ class Bench {
   public:
     explicit Bench(const Setting& setting, TetMesh made = ballMesh(5, 1))
         : mesh(meshWithFields(std::move(made))), fields(setting.fields) {
-        if (setting.algorithm == Algorithm::slicing)
-            resampler = std::make_unique<SlicingResampler>();
-        else
-            resampler = std::make_unique<SoftwareResampler>();
+        resampler = make(setting.algorithm);
         options.refine.criterion = Criterion::focus;
         options.refine.brickCells = kCells;
         options.refine.resolution = setting.resolution;
         options.refine.focus = {pointFocus({0.3, 0.2, 0.1}, 0.1)};
-        if (setting.algorithm == Algorithm::slicing)
+        if (setting.algorithm != Algorithm::software)
             options.refine.bind = {.target = std::string(nameOf(kPlatform)), .format = setting.format};
         options.budgetBytes =
             std::int64_t(setting.budgetBricks) * 729 * (4 * std::int64_t(fields.size()) + 1);
@@ -314,7 +327,7 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
     TESSERA_NEEDS_GL(kPlatform);
     Setting setting;
     std::tie(setting.format, setting.algorithm) = GetParam();
-    const bool isSlow = setting.algorithm == Algorithm::slicing;
+    const bool isSlow = setting.algorithm != Algorithm::software;
     if (isSlow) setting.resolution = 125, setting.budgetBricks = 150;
     // One of each kind: several threads, a single channel, two groups of channels, several atlases, bounds.
     if (setting.format == SampleFormat::r32f) setting.threads = 3;
@@ -361,11 +374,11 @@ TEST_P(PoolOfFormat, HoldsTheSeamRulesValuesAfterPublications) {
 INSTANTIATE_TEST_SUITE_P(All, PoolOfFormat,
                          testing::Combine(testing::Values(SampleFormat::r32f, SampleFormat::r16f,
                                                           SampleFormat::r16, SampleFormat::r8),
-                                          testing::Values(Algorithm::software, Algorithm::slicing)),
+                                          testing::Values(Algorithm::software, Algorithm::slicing,
+                                                          Algorithm::hybrid, Algorithm::compute)),
                          [](const testing::TestParamInfo<PoolOfFormat::ParamType>& param) {
-                             return std::string(nameOf(std::get<0>(param.param))) +
-                                    (std::get<1>(param.param) == Algorithm::software ? "_software"
-                                                                                     : "_slicing");
+                             return std::string(nameOf(std::get<0>(param.param))) + "_" +
+                                    std::string(kNames[int(std::get<1>(param.param))]);
                          });
 
 // TESSERA_SCHEDULE_SEEDS and TESSERA_SCHEDULE_STEPS ask for more.
