@@ -48,9 +48,20 @@ std::size_t firstBucket(std::size_t i) {
 
 std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first) {
     std::vector<ScanRun> runs;
-    for (std::size_t i = 0; i + 1 < first.size(); ++i)
-        if (first[i + 1] > first[i])
-            runs.push_back({i > kPartSizes, first[i], first[i + 1] - first[i], 1u << i % (kPartSizes + 1)});
+    for (const bool isThin : {false, true}) {
+        const std::uint32_t* const at = first.data() + (isThin ? kPartSizes + 1 : 0);
+        std::size_t most = kPartSizes;
+        while (most > 0 && at[most + 1] == at[most]) --most;
+        const auto add = [&](std::size_t from, std::size_t to) {
+            if (at[to + 1] > at[from]) runs.push_back({isThin, at[from], at[to + 1] - at[from], 1u << to});
+        };
+        add(0, 0);
+        // Where there is room for them, all larger boxes in one go.
+        if (std::size_t(at[most + 1] - at[1]) << most <= kPartRoom)
+            add(1, std::max<std::size_t>(1, most));
+        else
+            for (std::size_t size = 1; size <= most; ++size) add(size, size);
+    }
     return runs;
 }
 

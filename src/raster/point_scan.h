@@ -29,7 +29,7 @@ struct ScanBox {
     std::uint32_t low, last;
 };
 
-/// Boxes of which each has about as many parts.
+/// Boxes that are gone through together.
 struct ScanRun {
     bool isThin;  ///< else their elements are easy
     std::size_t first, count;

@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include "base/large_pages.h"
 #include "base/timer.h"
 #include "gl/gl_platform.h"
 #include "raster/dispatch.h"
@@ -616,6 +615,33 @@ void RasterDevice::finishRegion(GlContext& context) {
     usedQueries_ = 0;
 }
 
+std::shared_ptr<ReadBuffer> RasterDevice::takeReadBuffer(GlContext& context, std::int64_t bytes) {
+    constexpr GLbitfield kMapping = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    std::unique_ptr<ReadBuffer> taken;
+    {
+        const std::lock_guard lock(freeBuffers_->mutex);
+        auto& buffers = freeBuffers_->buffers;
+        const auto fits = [&](const auto& free) { return free->buffer.bytes() >= bytes; };
+        auto found = std::ranges::find_if(buffers, fits);
+        if (found == buffers.end() && !buffers.empty())
+            found = buffers.begin();  // makes room for a larger one
+        if (found != buffers.end()) {
+            taken = std::move(*found);
+            buffers.erase(found);
+        }
+    }
+    if (!taken || taken->buffer.bytes() < bytes) {
+        taken.reset();
+        taken = std::make_unique<ReadBuffer>();
+        taken->buffer = GlBuffer(context, bytes, kMapping | GL_CLIENT_STORAGE_BIT);
+        taken->mapped = static_cast<const std::byte*>(taken->buffer.map(0, bytes, kMapping));
+    }
+    return {taken.release(), [free = freeBuffers_](ReadBuffer* buffer) {
+                const std::lock_guard lock(free->mutex);
+                free->buffers.emplace_back(buffer);
+            }};
+}
+
 RasterImage RasterDevice::readBack(GlContext& context) {
     const GlFunctions& gl = context.functions();
     finishRegion(context);
@@ -623,18 +649,34 @@ RasterImage RasterDevice::readBack(GlContext& context) {
     RasterImage image;
     image.components = channels_ == 1 ? 1 : 4;
     const auto pixels = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
-    resizeLarge(image.codes, pixels * std::size_t(image.components));
-    gl.GetTextureSubImage(target_.codes.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z,
-                          image.components == 1 ? GL_RED : GL_RGBA, GL_FLOAT,
-                          GLsizei(image.codes.size() * sizeof(float)), image.codes.data());
-    if (target_.coverage) {
-        image.coverage.resize(pixels);
-        gl.GetTextureSubImage(target_.coverage.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, GL_RED,
-                              GL_UNSIGNED_BYTE, GLsizei(pixels), image.coverage.data());
-    }
+    const std::size_t codes = pixels * std::size_t(image.components);
+    const std::size_t codeBytes = codes * sizeof(float), coverage = target_.coverage ? pixels : 0;
+    const std::shared_ptr<ReadBuffer> memory =
+        takeReadBuffer(context, std::int64_t(std::max<std::size_t>(4, codeBytes + coverage)));
+    const auto copy = [&](const GlTexture& texture, GLenum format, GLenum type, std::size_t bytes,
+                          std::size_t to) {
+        gl.GetTextureSubImage(texture.id(), 0, 0, 0, 0, size_.x, size_.y, size_.z, format, type,
+                              GLsizei(bytes), reinterpret_cast<void*>(to));
+    };
+    gl.BindBuffer(GL_PIXEL_PACK_BUFFER, memory->buffer.id());
+    copy(target_.codes, image.components == 1 ? GL_RED : GL_RGBA, GL_FLOAT, codeBytes, 0);
+    if (target_.coverage) copy(target_.coverage, GL_RED, GL_UNSIGNED_BYTE, coverage, codeBytes);
+    gl.BindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    memory->filled = GlFence(context);
+    image.isFilled = memory->filled.isSignaled();
+    image.codes = {reinterpret_cast<const float*>(memory->mapped), codes};
+    image.coverage = {reinterpret_cast<const std::uint8_t*>(memory->mapped + codeBytes), coverage};
+    image.memory = memory;
     counts_.readBackMs += timer.elapsedMs();
-    counts_.readBackBytes += std::int64_t(image.codes.size() * sizeof(float) + image.coverage.size());
+    counts_.readBackBytes += std::int64_t(codeBytes + coverage);
     return image;
+}
+
+void RasterDevice::waitFor(GlContext&, RasterImage& image) {
+    const Timer timer;
+    image.memory->filled.wait();
+    image.isFilled = true;
+    counts_.readBackMs += timer.elapsedMs();
 }
 
 void RasterDevice::copyTo(GlContext& context, const IndexBox& points, const SlotPlace& place,
@@ -650,6 +692,9 @@ void RasterDevice::copyTo(GlContext& context, const IndexBox& points, const Slot
 }
 
 RasterCounts RasterDevice::takeCounts() {
+    // A run leaves the memory of two images behind, for the next one.
+    const std::lock_guard lock(freeBuffers_->mutex);
+    if (freeBuffers_->buffers.size() > 2) freeBuffers_->buffers.resize(2);
     return std::exchange(counts_, {});
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,11 +27,22 @@ struct RasterCounts {
     std::int64_t fragments = 0, vertices = 0, uploadBytes = 0, readBackBytes = 0;
 };
 
-/// A rendered region: codes of `components` floats a point, pixel by pixel, row by row, layer by layer.
+/// Memory that the device copies to and the processor reads.
+struct ReadBuffer {
+    GlBuffer buffer;
+    const std::byte* mapped = nullptr;
+    GlFence filled;
+};
+
+/// A rendered region: codes of `components` floats a point, pixel by pixel, row by row, layer by layer. It
+/// must not outlive its device.
 struct RasterImage {
     int components = 1;
-    std::vector<float> codes;
-    std::vector<std::uint8_t> coverage;  ///< of the normalised formats: 0, or 1 + a bit a channel not finite
+    std::span<const float> codes;
+    std::span<const std::uint8_t>
+        coverage;  ///< of the normalised formats: 0, or 1 + a bit a channel not finite
+    std::shared_ptr<const ReadBuffer> memory;  ///< where both stand; used again when the last image lets go
+    bool isFilled = false;                     ///< else RasterDevice::waitFor() it
 };
 
 /// Renders the slabs of one region after another into a layered target. All functions but the constructor run
@@ -62,7 +75,9 @@ class RasterDevice {
     /// Draws what a generator made. Each slice may be drawn by one call only.
     void draw(GlContext& context, const SliceBatch& batch);
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);
+    /// Copies the region to the processor's memory, which goes on while the device is given other work.
     RasterImage readBack(GlContext& context);
+    void waitFor(GlContext& context, RasterImage& image);
     RasterCounts takeCounts();
 
     /// Copies some points of the region, rendered with layers along z and its lowest point at `origin`, to
@@ -127,6 +142,12 @@ class RasterDevice {
         std::size_t next = 0, filled = 0;
     };
 
+    /// Buffers that no image holds.
+    struct FreeBuffers {
+        std::mutex mutex;
+        std::vector<std::unique_ptr<ReadBuffer>> buffers;
+    };
+    std::shared_ptr<ReadBuffer> takeReadBuffer(GlContext& context, std::int64_t bytes);
     const GlProgram& program(GlContext& context, const Variant& variant);
     GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
@@ -161,6 +182,7 @@ class RasterDevice {
     std::map<Variant, GlProgram> programs_;
     RecordMaker records_;
     Target target_;
+    std::shared_ptr<FreeBuffers> freeBuffers_ = std::make_shared<FreeBuffers>();
     Stream easyGeometry_{kOfRegions}, easyChannels_{kOfRegions}, thinGeometry_{kOfRegions},
         thinChannels_{kOfRegions}, published_{kOfRegions}, nodeCodes_{kOfRegions};
     Stream vertices_{kOfBatches}, indices_{kOfBatches};

@@ -479,7 +479,11 @@ void BoundRaster::Run::finishOldest() {
     RegionJob& job = jobs_.front();
     std::vector<RasterImage> images;
     for (auto& draw : job.draws) draw.get();
-    for (auto& image : job.images) images.push_back(image.get());
+    for (auto& image : job.images) {
+        images.push_back(image.get());
+        if (!images.back().isFilled)
+            device_.thread().run([&](GlContext& context) { device_.waitFor(context, images.back()); });
+    }
     job.prepared = {};
     if (slots_) {
         jobs_.pop_front();
