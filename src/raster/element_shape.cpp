@@ -22,7 +22,11 @@ void placeNodes(const TetMesh& mesh, const NodeFrame& frame, std::int32_t elemen
         const double first =
             std::min({nodes[0]->whole[a], nodes[1]->whole[a], nodes[2]->whole[a], nodes[3]->whole[a]});
         shape.first[a] = int(std::clamp(first, -0x1p31, 0x1p31 - 1));
-        for (int k = 0; k < 4; ++k) shape.node[k][a] = (nodes[k]->whole[a] - first) + nodes[k]->part[a];
+        for (int k = 0; k < 4; ++k) {
+            // Beyond 2^53 voxels nothing is left for the rest, which then is rounding alone.
+            const double part = std::fabs(nodes[k]->whole[a]) < 0x1p53 ? nodes[k]->part[a] : 0;
+            shape.node[k][a] = (nodes[k]->whole[a] - first) + part;
+        }
         shape.low[a] = std::min({shape.node[0][a], shape.node[1][a], shape.node[2][a], shape.node[3][a]});
         shape.high[a] = std::max({shape.node[0][a], shape.node[1][a], shape.node[2][a], shape.node[3][a]});
     }

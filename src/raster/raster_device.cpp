@@ -202,10 +202,7 @@ void RasterDevice::clear(GlContext& context) {
 
 void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                          std::size_t pass, bool scans) {
-    // Geometry stays where the first pass put it.
-    const bool hasGeometry = pass == 0 || isReady_;
-    begin(context, region.points, inputs, pass, scans);
-    isReady_ = false;
+    const bool hasGeometry = prepare(context, region.points, inputs, pass, scans);
     if (!region.easy.geometry.empty()) {
         if (pass == 0) upload(context, easyGeometry_, region.easy.geometry);
         upload(context, easyChannels_, region.easy.channels[pass]);
@@ -222,7 +219,16 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
 }
 
 void RasterDevice::begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs,
-                         std::size_t pass, bool scans) {
+                         std::size_t pass, const DeviceMesh& mesh) {
+    const bool hasGeometry = prepare(context, points, inputs, pass, true);
+    records_.makeChannels(context, mesh, pass, inputs.format);
+    isReady_ = hasGeometry;
+}
+
+bool RasterDevice::prepare(GlContext& context, const IndexBox& points, const RasterInputs& inputs,
+                           std::size_t pass, bool scans) {
+    // Geometry stays where the first pass put it.
+    const bool hasGeometry = pass == 0 || isReady_;
     isReady_ = false;
     axes_ = inputs.axes;
     format_ = inputs.format;
@@ -232,7 +238,7 @@ void RasterDevice::begin(GlContext& context, const IndexBox& points, const Raste
     size_ = {size[axes_.s], size[axes_.t], size[axes_.l]};
     prepareTarget(context, size_ + Vec3i(kPadding, kPadding, 0), scans);
     if (!scans) clear(context);
-    isReady_ = true;
+    return hasGeometry;
 }
 
 /// At most two parts are under way on an emulated device.

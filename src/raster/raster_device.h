@@ -59,9 +59,9 @@ class RasterDevice {
     /// @param scans the region is scanned, not drawn.
     void begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                std::size_t pass = 0, bool scans = false);
-    /// The same of a region whose records are made on the device.
+    /// The same of the region that records() are of, which is scanned; makes their channels.
     void begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs, std::size_t pass,
-               bool scans);
+               const DeviceMesh& mesh);
     /// Of records that are made on the device.
     RecordMaker& records() { return records_; }
     /// Samples the region by compute shaders, layers along z. The boxes and the places of the points are
@@ -149,6 +149,9 @@ class RasterDevice {
     };
     std::shared_ptr<ReadBuffer> takeReadBuffer(GlContext& context, std::int64_t bytes);
     const GlProgram& program(GlContext& context, const Variant& variant);
+    /// What begin() does in any case; false when a pass before it failed.
+    bool prepare(GlContext& context, const IndexBox& points, const RasterInputs& inputs, std::size_t pass,
+                 bool scans);
     GlProgram makeScanProgram(GlContext& context, const Variant& variant, std::vector<ShaderDefine> defines);
     void prepareTarget(GlContext& context, const Vec3i& size, bool scans);
     void prepareScan(GlContext& context);

@@ -186,6 +186,7 @@ class BoundRaster : public BoundResampler {
     std::shared_ptr<const SliceGenerator> generator_;
     std::vector<ChannelCoding> channels_;
     mutable std::shared_ptr<const DeviceMesh> onDevice_;  ///< the whole mesh, once a scan needed it
+    mutable bool isTooLarge_ = false;                     ///< for the device's memory
 };
 
 ResampleStatistics BoundRaster::Run::all() {
@@ -200,15 +201,21 @@ ResampleStatistics BoundRaster::Run::all() {
     plan();
     statistics_.addMs(stage::bin, timer.restart());
     try {
-        for (std::int64_t started = 1; !left_.empty(); ++started) {
+        const auto pointsLeft = [&] {
+            std::int64_t points = 0;
+            for (const RasterRegion& region : left_) points += region.points.count();
+            return points;
+        };
+        const std::int64_t all = pointsLeft();
+        for (std::size_t index = 0; !left_.empty(); ++index) {
             execution_.throwIfCancelled();
             // The device draws one region while the processor prepares the next.
             if (deviceMesh_)
                 startOnDevice();
             else
-                start(std::size_t(started) - 1);
+                start(index);
             if (jobs_.size() > 1) finishOldest();
-            execution_.report(Stage::sampling, started, started + std::int64_t(left_.size()));
+            execution_.report(Stage::sampling, all - pointsLeft(), all);
         }
         while (!jobs_.empty()) finishOldest();
     } catch (...) {
@@ -265,14 +272,17 @@ std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
     const WorkMemory work = rasterWorkMemory(int(channels_.size()));
     const std::int64_t bytes = bound_.workBytes_ > 0 ? std::max(bound_.workBytes_, work.least) : work.most;
     const std::int64_t ofMesh = DeviceMesh::bytesOf(mesh(), channels_);
-    if (device_.thread().info().isSoftware) {
+    GlThread& thread = device_.thread();
+    if (thread.info().isSoftware) {
         if (ofMesh > bytes / 4) return nullptr;
         budget_ = shareOut(bytes - ofMesh, int(channels_.size()));
+    } else if (ofMesh > thread.info().limits.storageBlockBytes) {
+        return nullptr;  // no buffer may be larger
     }
-    GlThread& thread = device_.thread();
     if (!thread.run([&](GlContext& context) { return device_.records().isExact(context); })) return nullptr;
-    if (!bound_.onDevice_) {
-        const DeviceMesh::Source source(mesh(), channels_, bound_.format_, execution_);
+    if (bound_.onDevice_ || bound_.isTooLarge_) return bound_.onDevice_;
+    const DeviceMesh::Source source(mesh(), channels_, bound_.format_, execution_);
+    try {
         bound_.onDevice_ = thread.run([&](GlContext& context) {
             auto made = std::make_unique<DeviceMesh>(context, source);
             context.throwIfFailed();
@@ -280,6 +290,8 @@ std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
             return std::shared_ptr<const DeviceMesh>(
                 made.release(), [&thread](const DeviceMesh* mesh) { thread.dispose(mesh); });
         });
+    } catch (const GlMemoryError&) {
+        bound_.isTooLarge_ = true;  // regions may have room where the mesh has none
     }
     return bound_.onDevice_;
 }
@@ -350,8 +362,7 @@ void BoundRaster::Run::startOnDevice() {
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
         const bool isLast = pass + 1 == inputs.passCount();
         job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
-            device_.begin(context, job.region.points, inputs, pass, true);
-            device_.records().makeChannels(context, *deviceMesh_, pass, inputs.format);
+            device_.begin(context, job.region.points, inputs, pass, *deviceMesh_);
         }));
         auto points = std::make_shared<const std::vector<DecidedPoint>>(
             decideHardElements(inputs, job.prepared, pass, execution_));

@@ -100,7 +100,8 @@ DeviceMesh::DeviceMesh(GlContext& context, const Source& source)
 }
 
 std::int64_t DeviceMesh::bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels) {
-    std::int64_t aNode = 11 * std::int64_t(sizeof(double)),
+    // Three doubles of a node, and a quarter more than eight when it is placed.
+    std::int64_t aNode = 13 * std::int64_t(sizeof(double)),
                  anElement = 4 * std::int64_t(sizeof(std::int32_t)) + 1;
     for (const ChannelCoding& coding : channels)
         (coding.isOfCells() ? anElement : aNode) +=

@@ -111,6 +111,25 @@ TEST_P(RasterSceptic, EmptyMeshesCoverNothing) {
     }
 }
 
+TEST_P(RasterSceptic, ElementsThatReachFarBeyondTheLatticeAreCovered) {
+    for (const double far : {1e9, 1e20, 1e31, 1e60, 1e300}) {
+        TetMesh mesh;
+        mesh.points = {{-5, -5, -5}, {50, -5, -5}, {-5, 50, -5}, {-5, -5, far}};
+        mesh.tets = {{0, 1, 2, 3}};
+        const IndexBox box{Vec3i(0), Vec3i(8)};
+        const Lattice lattice = Lattice::axisParallel(Vec3d(0), 1);
+        EXPECT_EQ(coveredCount(sample(mesh, {}, lattice, std::span(&box, 1))[0]), 512) << far;
+        // A node so far to the other side that an index has no fraction, nor an int room for it.
+        mesh.points = {far * Vec3d(1.5, -2.2, -0.9), {10, 19, 25}, {35, -0.3, -21}, {-13, 32, 20}};
+        const IndexBox wide{Vec3i(0), Vec3i(40)};
+        const auto ofSoftware = sampleOnce("software", mesh, {}, {}, lattice, std::span(&wide, 1));
+        EXPECT_GT(coveredCount(ofSoftware.blocks[0]), 100);
+        EXPECT_EQ(coveredCount(sample(mesh, {}, lattice, std::span(&wide, 1))[0]),
+                  coveredCount(ofSoftware.blocks[0]))
+            << far;
+    }
+}
+
 TEST_P(RasterSceptic, NoBoxesAndEmptyBoxesAreServed) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> fields{0, 1};

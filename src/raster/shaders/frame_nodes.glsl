@@ -6,7 +6,7 @@ layout(std430, binding = 1) writeonly buffer Frame {
     double frame[];  // the whole voxels of x, y, z, and the rest
 };
 layout(std430, binding = 2) writeonly buffer Rough {
-    vec4 rough[];  // rounded places
+    vec4 rough[];  // rounded places; far ones are cut
 };
 uniform dvec3 originWorld, spacingWorld;
 uniform uint nodeCount;
@@ -32,7 +32,11 @@ void main() {
     precise dvec3 quotient = t / spacingWorld;
     precise dvec3 whole = floor(quotient);
     precise dvec3 part = (remainder(t, whole, spacingWorld) + tail) / spacingWorld;
-    rough[node] = vec4(vec3(whole + part), 0.0);
+    // Beyond 2^53 voxels nothing is left for the rest, which then is rounding alone.
+    part = mix(part, dvec3(0), greaterThanEqual(abs(whole), dvec3(9007199254740992.0LF)));
+    const double kFarthest = 4294967296.0LF;
+    rough[node] = vec4(vec3(clamp(quotient, dvec3(-kFarthest), dvec3(kFarthest))), 0.0);
+    if (any(isnan(quotient)) || any(isinf(quotient))) rough[node].w = 1.0;  // nowhere
     for (int a = 0; a < 3; ++a) {
         frame[6u * node + uint(a)] = whole[a];
         frame[6u * node + 3u + uint(a)] = part[a];

@@ -40,7 +40,9 @@ void main() {
     uint element = threadIndex();
     if (element >= elementCount) return;
     uvec4 tet = tets[element];
-    vec3 a = rough[tet.x & ~(1u << 31)].xyz, b = rough[tet.y].xyz, c = rough[tet.z].xyz, d = rough[tet.w].xyz;
+    vec4 ofA = rough[tet.x & ~(1u << 31)], ofB = rough[tet.y], ofC = rough[tet.z], ofD = rough[tet.w];
+    if (ofA.w + ofB.w + ofC.w + ofD.w > 0.0) return;
+    vec3 a = ofA.xyz, b = ofB.xyz, c = ofC.xyz, d = ofD.xyz;
     vec3 low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));
     // Twice the rounding of a place, and of the bounds.
     vec3 room = max(max(abs(low), abs(high)), max(abs(lowest), abs(highest))) * ROUGH + MARGIN;
@@ -48,8 +50,7 @@ void main() {
     float extent = max(max(sizes.x, sizes.y), sizes.z), farthest = max(max(far.x, far.y), far.z);
     low = max(ceil(low - room), lowest);
     high = min(floor(high + room), highest);
-    // False for what isn't a number.
-    if (!all(lessThanEqual(low, high)) || !all(lessThan(abs(a + b + c + d), vec3(1e30)))) return;
+    if (!all(lessThanEqual(low, high))) return;
     if (all(lessThanEqual(high, low + 1.0)) && liesBetween(a, b, c, d, low, extent, farthest)) return;
     atomicOr(marks[element >> 5], 1u << (element & 31u));
 }
