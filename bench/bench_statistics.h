@@ -21,10 +21,11 @@ double medianOf(const std::vector<Sample>& samples, Figure figure) {
 }
 
 /// Processor time of all threads of this process so far, those of an emulated OpenGL device included, in
-/// milliseconds. On a busy machine it is steadier than the wall clock.
-inline double processorMs() {
+/// milliseconds; or of the calling thread, RUSAGE_THREAD. On a busy machine it is steadier than the wall
+/// clock.
+inline double processorMs(int who = RUSAGE_SELF) {
     rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
+    getrusage(who, &usage);
     const auto ms = [](const timeval& t) { return double(t.tv_sec) * 1e3 + double(t.tv_usec) * 1e-3; };
     return ms(usage.ru_utime) + ms(usage.ru_stime);
 }

@@ -4,7 +4,6 @@
 // a batch of small bricks that stay there. Medians of interleaved runs, in milliseconds.
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -34,14 +33,6 @@ struct Options {
     int runs = 5, threads = 0;
 };
 
-/// Processor time of the calling thread so far, in milliseconds.
-double threadMs() {
-    rusage usage{};
-    getrusage(RUSAGE_THREAD, &usage);
-    const auto ms = [](const timeval& t) { return double(t.tv_sec) * 1e3 + double(t.tv_usec) * 1e-3; };
-    return ms(usage.ru_utime) + ms(usage.ru_stime);
-}
-
 /// What one way of sampling took.
 struct Times {
     double wallMs = 0;
@@ -52,7 +43,10 @@ struct Times {
 
 template <class Work>
 Times timed(GlThread& thread, Work work) {
-    const auto processor = [&] { return threadMs() + thread.run([](GlContext&) { return threadMs(); }); };
+    const auto processor = [&] {
+        return tessera::bench::processorMs(RUSAGE_THREAD) +
+               thread.run([](GlContext&) { return tessera::bench::processorMs(RUSAGE_THREAD); });
+    };
     Times times;
     const double before = processor();
     const Timer timer;

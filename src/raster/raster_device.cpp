@@ -109,10 +109,11 @@ const GlProgram& RasterDevice::program(GlContext& context, const Variant& varian
                            {GL_FRAGMENT_SHADER, text::kPointFragment, output}},
                           defines)
             : makeProgram(context,
-                          {{GL_VERTEX_SHADER, text::kElementVertex, {text::kRecord}},
+                          {{GL_VERTEX_SHADER, text::kElementVertex, {text::kRecordTypes, text::kRecord}},
                            {GL_FRAGMENT_SHADER,
                             text::kElementFragment,
-                            {text::kRecord, text::kDecide, text::kSampleCodes, text::kSampleOutput}}},
+                            {text::kRecordTypes, text::kRecord, text::kDecide, text::kSampleCodes,
+                             text::kSampleOutput}}},
                           defines);
     return programs_.emplace(variant, std::move(made)).first->second;
 }
@@ -132,8 +133,8 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
     };
     switch (stage) {
         case Stage::parts:
-            return made(text::kScanParts,
-                        {text::kRecord, text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
+            return made(text::kScanParts, {text::kRecordTypes, text::kRecord, text::kScanMarks,
+                                           text::kScanBoxes, text::kScanPartCounts});
         case Stage::plan:
             return made(text::kScanPlan, {text::kScanMarks, text::kScanPartCounts});
         case Stage::clear:
@@ -142,18 +143,19 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
         case Stage::contenders1:
         case Stage::contenders2:
         case Stage::contenders3:
-            return made(text::kScanContenders, {text::kRecord, text::kThinRecord, text::kDecide,
-                                                text::kScanMarks, text::kDecidedPoints});
+            return made(text::kScanContenders, {text::kRecordTypes, text::kRecord, text::kThinRecord,
+                                                text::kDecide, text::kScanMarks, text::kDecidedPoints});
         case Stage::values:
-            return made(text::kScanValues, {text::kRecord, text::kThinRecord, text::kDecide,
-                                            text::kSampleCodes, text::kScanMarks, text::kDecidedPoints});
+            return made(text::kScanValues,
+                        {text::kRecordTypes, text::kRecord, text::kThinRecord, text::kDecide,
+                         text::kSampleCodes, text::kScanMarks, text::kDecidedPoints});
         case Stage::pointFirst:
         case Stage::pointOrders:
         case Stage::pointRanks:
             return made(text::kScanPoints, {text::kDecide, text::kScanMarks, text::kDecidedPoints});
         default:
-            return made(text::kScanElements, {text::kRecord, text::kDecide, text::kScanMarks,
-                                              text::kScanBoxes, text::kScanPartCounts});
+            return made(text::kScanElements, {text::kRecordTypes, text::kRecord, text::kDecide,
+                                              text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
     }
 }
 

@@ -192,11 +192,13 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
                 return made(text::kListElements, {});
             case Stage::easyGeometry:
             case Stage::thinGeometry:
-                return made(text::kRecordGeometry, {text::kPlacedNodes, text::kElementShape, text::kRanks,
-                                                    text::kScanBoxes, text::kScanBuckets});
+                return made(text::kRecordGeometry,
+                            {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
+                             text::kScanBoxes, text::kScanBuckets});
             case Stage::channels:
-                return made(text::kRecordChannels, {text::kPlacedNodes, text::kElementShape, text::kRanks,
-                                                    text::kScanBoxes, text::kScanBuckets});
+                return made(text::kRecordChannels,
+                            {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
+                             text::kScanBoxes, text::kScanBuckets});
             case Stage::sort:
                 return made(text::kSortBoxes, {text::kRanks, text::kScanBoxes, text::kScanBuckets});
             case Stage::counts:

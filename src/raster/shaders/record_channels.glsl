@@ -1,7 +1,4 @@
 // Records of channels, a thread an element: of easy ones by their boxes, or of thin ones; as src/raster/channel_coding.cpp makes them.
-struct Channel {
-    vec4 gradient, values;
-};
 struct NodeCode {
     double code;
     float rounded;

@@ -1,16 +1,5 @@
 // Records of the listed elements' geometry and their boxes, a thread an element: of easy elements where they stand
 // in the list, and with THIN those of thin ones, ascending, a thread a box.
-#ifdef THIN
-#define Real double
-#define Real4 dvec4
-#else
-#define Real float
-#define Real4 vec4
-#endif
-struct Geometry {
-    Real4 nx, ny, nz, offset;
-    vec4 base;
-};
 layout(std430, binding = 2) readonly buffer Listed {
     uint listed[];
 };
