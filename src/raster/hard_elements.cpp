@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "base/parallel.h"
@@ -89,7 +90,8 @@ std::vector<DecidedPoint> decideCell(const RasterInputs& inputs, std::span<const
                            {0, 0, 0, 0}};
         for (std::size_t c = 0; c < channels.size(); ++c) {
             const float value = values[c][i];
-            point.codes[c] = std::isfinite(value) ? float(codings[c].encode(double(value))) : invalid;
+            const float code = std::isfinite(value) ? float(codings[c].encode(double(value))) : invalid;
+            point.codes[c] = std::fabs(code) < std::numeric_limits<float>::min() ? 0 : code;  // as codeAt()
         }
         points.push_back(point);
     }

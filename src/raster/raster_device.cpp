@@ -19,8 +19,8 @@ namespace {
 constexpr int kPadding = kSmallExtent + 2;
 /// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
 constexpr const char* kDepthScale = "1.220703125e-4";
-/// Of a scan: bytes of what it notes.
-constexpr std::size_t kMostAgain = kMostScanRuns + 2;  ///< dispatches that are made once more
+/// Of a scan: dispatches that may be made once more, and bytes of what it notes.
+constexpr std::size_t kMostAgain = kMostScanRuns + 2;
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
 /// corners.

@@ -39,8 +39,8 @@ struct ReadBuffer {
 struct RasterImage {
     int components = 1;
     std::span<const float> codes;
-    std::span<const std::uint8_t>
-        coverage;  ///< of the normalised formats: 0, or 1 + a bit a channel not finite
+    /// Of the normalised formats: 0, or 1 + a bit a channel that isn't finite.
+    std::span<const std::uint8_t> coverage;
     std::shared_ptr<const ReadBuffer> memory;  ///< where both stand; used again when the last image lets go
     bool isFilled = false;                     ///< else RasterDevice::waitFor() it
 };

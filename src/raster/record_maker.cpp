@@ -313,6 +313,7 @@ std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, c
     near.run(mesh.elementCount_);
     const std::size_t total = addUp(context, marks_, words, true, markSums_);
     listedCount_ = read<GLuint>(context, markSums_, total, 1).front();
+    TESSERA_CHECK(listedCount_ < std::size_t(1) << kRankKindShift, "ranks hold the records");
     return std::int64_t(listedCount_);
 }
 

@@ -16,9 +16,11 @@ float orderOf(float depth) {
     return order;
 }
 
-// A channel's code at a place.
+// A channel's code at a place. What is denormal is zero, whether the device keeps it or not.
 float codeAt(vec4 gradient, vec4 values, vec3 place) {
+    const float kLeast = 1.17549435e-38;
     precise float rise = gradient.x * place.x + gradient.y * place.y + gradient.z * place.z + gradient.w;
     precise float sum = values.x + rise;
-    return clamp(sum, values.y, values.z);
+    float code = clamp(sum, values.y, values.z);
+    return abs(code) < kLeast ? 0.0 : code;
 }
