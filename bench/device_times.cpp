@@ -126,8 +126,8 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
             all.push_back({algorithm, resampler.bind(mesh, fields, bind), 0, {}, {}});
             all.back().bindMs = timer.elapsedMs();
         }
-        for (int run = -1; run < options.runs;
-             ++run)  // the first compiles shaders and puts meshes on the device
+        // The first compiles shaders and puts meshes on the device.
+        for (int run = -1; run < options.runs; ++run)
             for (Row& row : all) {
                 const BlockSink nobody = [](std::size_t, const Block&) {};
                 const Times blocks = timed(

@@ -17,7 +17,7 @@ Vec3i unpacked(std::uint32_t place) {
     return {int(place & 255), int(place >> 8 & 255), int(place >> 16 & 255)};
 }
 
-/// As scan_parts.glsl cuts them.
+/// As scan_boxes.glsl cuts them.
 unsigned partsOf(const Vec3i& size) {
     Vec3i part = size;
     while (part.x * part.y * part.z > kPartPoints) {

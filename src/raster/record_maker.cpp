@@ -196,9 +196,8 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
                             {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
                              text::kScanBoxes, text::kScanBuckets});
             case Stage::channels:
-                return made(text::kRecordChannels,
-                            {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
-                             text::kScanBoxes, text::kScanBuckets});
+                return made(text::kRecordChannels, {text::kRecordTypes, text::kPlacedNodes,
+                                                    text::kElementShape, text::kRanks, text::kScanBoxes});
             case Stage::sort:
                 return made(text::kSortBoxes, {text::kRanks, text::kScanBoxes, text::kScanBuckets});
             case Stage::counts:

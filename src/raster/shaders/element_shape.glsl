@@ -90,3 +90,9 @@ uniform ivec3 cellMin;
 dvec3 baseOf(Placed placed) {
     return max(dvec3(0), dvec3(cellMin) - placed.first);
 }
+// A face's distance at the base.
+double offsetAt(Shape shape, int face, dvec3 base) {
+    dvec3 n = shape.normal[face];
+    precise double at = shape.offset[face] + n.x * base.x + n.y * base.y + n.z * base.z;
+    return at;
+}

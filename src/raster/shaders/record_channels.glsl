@@ -1,4 +1,5 @@
-// Records of channels, a thread an element: of easy ones by their boxes, or of thin ones; as src/raster/channel_coding.cpp makes them.
+// Records of channels, a thread an element: of easy ones by their boxes, or of thin ones; as
+// src/raster/channel_coding.cpp makes them.
 struct NodeCode {
     double code;
     float rounded;
@@ -40,11 +41,6 @@ void main() {
     Placed placed = placeNodes(tet);
     Shape shape = shapeElement(placed);
     dvec3 base = baseOf(placed);
-    precise double at[4];
-    for (int k = 1; k < 4; ++k) {
-        dvec3 n = shape.normal[k];
-        at[k] = shape.offset[k] + n.x * base.x + n.y * base.y + n.z * base.z;
-    }
     const uint nodeChannels = uint(CHANNELS - bitCount(cellMask)), cellChannels = uint(bitCount(cellMask));
     uint n = 0u, c = 0u;
     for (uint channel = 0u; channel < uint(CHANNELS); ++channel) {
@@ -63,7 +59,7 @@ void main() {
                 for (int k = 1; k < 4; ++k) {
                     precise double slope = (codes[k].code - codes[0].code) / shape.height[k];
                     gradient += slope * shape.normal[k];
-                    start += slope * at[k];
+                    start += slope * offsetAt(shape, k, base);
                 }
                 made.gradient = vec4(asFloat(gradient.x), asFloat(gradient.y), asFloat(gradient.z), asFloat(start));
                 made.values.x = float(codes[0].code);

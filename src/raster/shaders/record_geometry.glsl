@@ -36,11 +36,10 @@ Geometry recordOf(Placed placed, Shape shape) {
     Real4 nx, ny, nz, offset;
     for (int face = 0; face < 4; ++face) {
         dvec3 n = shape.normal[face];
-        precise double at = shape.offset[face] + n.x * base.x + n.y * base.y + n.z * base.z;
         nx[face] = Real(n.x);
         ny[face] = Real(n.y);
         nz[face] = Real(n.z);
-        offset[face] = Real(at);
+        offset[face] = Real(offsetAt(shape, face, base));
     }
     precise dvec3 place = placed.first + base - dvec3(regionMin);
     precise float slack = float(shape.slack) * SLACK_FACTOR;

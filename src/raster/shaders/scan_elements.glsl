@@ -4,6 +4,7 @@ layout(std430, binding = 5) readonly buffer Boxes {
 };
 uniform uint firstBox, boxCount;
 uniform int chunk;  // boxes are parts, as many as scan_parts.glsl listed; -1: they aren't
+
 // The i-th point of a box of at most 2^10 points; the reciprocals are those of a row's and a layer's count.
 uvec3 placeInBox(uint i, uvec3 size, float ofRow, float ofLayer) {
     uint z = uint((float(i) + 0.5) * ofLayer);
@@ -15,7 +16,12 @@ Real depthIn(Geometry geometry, uvec3 point) {
     return depthAt(geometry.nx, geometry.ny, geometry.nz, geometry.offset, vec3(point) - geometry.base.xyz);
 }
 
-void scanPoints(Geometry geometry, uint rank, uvec3 low, uvec3 size) {
+void main() {
+    uint index = threadIndex();
+    if (index >= (chunk >= 0 ? partCounts[chunk & 1].parts : boxCount)) return;
+    Box box = boxes[firstBox + index];
+    Geometry geometry = geometries[box.rank & kPlaceMask];
+    uvec3 low = unpack(box.low), size = unpack(box.last) - low + 1u;
     uint count = size.x * size.y * size.z;
     float ofRow = 1.0 / float(size.x), ofLayer = 1.0 / float(size.x * size.y);
     for (uint first = 0u; first < count; first += 32u) {
@@ -30,24 +36,16 @@ void scanPoints(Geometry geometry, uint rank, uvec3 low, uvec3 size) {
 #if defined(ORDERS)
             noteOrder(placeOf(point), orderOf(float(depthIn(geometry, point))));
 #elif defined(RANKS)
-            noteRank(placeOf(point), orderOf(float(depthIn(geometry, point))), rank);
+            noteRank(placeOf(point), orderOf(float(depthIn(geometry, point))), box.rank);
 #else
-            if (takeFirst(placeOf(point), rank) != 0u) contested |= left & -left;
+            if (takeFirst(placeOf(point), box.rank) != 0u) contested |= left & -left;
 #endif
         }
         for (; contested != 0u; contested &= contested - 1u) {
             uvec3 point = low + placeInBox(first + uint(findLSB(contested)), size, ofRow, ofLayer);
             // Whoever came first stays until all have come.
-            contend(placeOf(point), orderOf(float(depthIn(geometry, point))), rank,
+            contend(placeOf(point), orderOf(float(depthIn(geometry, point))), box.rank,
                     atomicOr(owners[placeOf(point)], 0u));
         }
     }
-}
-
-void main() {
-    uint index = threadIndex();
-    if (index >= (chunk >= 0 ? partCounts[chunk & 1].parts : boxCount)) return;
-    Box box = boxes[firstBox + index];
-    uvec3 low = unpack(box.low);
-    scanPoints(geometries[box.rank & kPlaceMask], box.rank, low, unpack(box.last) - low + 1u);
 }
