@@ -47,20 +47,19 @@ struct Counts {
 Counts countList(const PrimitiveList& list) {
     Counts counts;
     counts.sprites = std::int64_t(list.sprites.size());
-    counts.triangles = std::int64_t(list.indices.size()) / 3;
-    counts.vertices = counts.sprites + std::int64_t(list.vertices.size());
+    counts.triangles = std::int64_t(list.corners.size()) / 2;
+    counts.vertices = counts.sprites + std::int64_t(list.corners.size());
     counts.primitiveBytes =
-        std::int64_t(list.sprites.size() * sizeof(Sprite) + list.vertices.size() * sizeof(PolygonVertex) +
-                     list.indices.size() * sizeof(std::uint32_t));
+        std::int64_t(list.sprites.size() * sizeof(Sprite) + list.corners.size() * sizeof(PolygonVertex));
     for (const Sprite& sprite : list.sprites) {
         counts.pixels += double(sprite.edge) * sprite.edge;
         const auto quads = [&](int low) { return (low + sprite.edge - 1) / 2 - low / 2 + 1; };
         counts.quadPixels += 4.0 * quads(sprite.s) * quads(sprite.t);
     }
-    for (std::size_t i = 0; i + 2 < list.indices.size(); i += 3) {
-        const PolygonVertex& a = list.vertices[list.indices[i]];
-        const PolygonVertex& b = list.vertices[list.indices[i + 1]];
-        const PolygonVertex& c = list.vertices[list.indices[i + 2]];
+    for (std::size_t i = 0; i < list.corners.size(); i += i % 4 == 0 ? 1 : 3) {
+        const PolygonVertex& a = list.corners[i - i % 4];
+        const PolygonVertex& b = list.corners[i + 1];
+        const PolygonVertex& c = list.corners[i + 2];
         const double area =
             std::fabs(double(b.s - a.s) * double(c.t - a.t) - double(b.t - a.t) * double(c.s - a.s)) / 2;
         counts.pixels += area;

@@ -165,7 +165,8 @@ std::vector<Row> measureMesh(const Options& options, const std::string& path) {
     const std::vector<int> fields = file.mesh.fields.empty() ? std::vector<int>{} : std::vector<int>{0};
     std::vector<std::unique_ptr<tessera::BoundResampler>> bound;
     for (const std::string& name : options.algorithms) {
-        bound.push_back(tessera::findResampler(name).bind(file.mesh, fields));
+        bound.push_back(tessera::findResampler(name).bind(file.mesh, fields,
+                                                          {.primitives = tessera::Primitives::processor}));
         runOnce(*bound.back(), task, options.threads);
     }
     std::vector<std::vector<Sample>> samples(bound.size());

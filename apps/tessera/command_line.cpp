@@ -135,6 +135,13 @@ void addBindOptions(CLI::App& command, AlgorithmArguments& a) {
         ->check(CLI::IsMember({"r32f", "r16f", "r16", "r8"}))
         ->capture_default_str()
         ->group(group);
+    command
+        .add_option("--primitives", a.primitives,
+                    "who makes what an OpenGL resampler draws or scans: the device, where the mesh fits, or "
+                    "the processor, as in the paper; the result doesn't depend on it")
+        ->check(CLI::IsMember({"device", "processor"}))
+        ->capture_default_str()
+        ->group(group);
 }
 
 void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
@@ -613,6 +620,7 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
 
 void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
     command.add_option("mesh", a.request.mesh, "mesh file; the paper's is the bluntfin")->required();
+    a.algorithm.primitives = nameOf(Primitives::processor);
     addBindOptions(command, a.algorithm);
     command.add_option("--field", a.request.field,
                        "the field to sample (default: the first scalar field of the points)");

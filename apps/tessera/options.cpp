@@ -196,6 +196,7 @@ BindOptions bindOptions(const AlgorithmArguments& a) {
     for (const SampleFormat format :
          {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8})
         if (nameOf(format) == a.sampleFormat) options.format = format;
+    if (a.primitives == nameOf(Primitives::processor)) options.primitives = Primitives::processor;
     return options;
 }
 

@@ -38,6 +38,7 @@ struct AlgorithmArguments {
     std::string name = "software";
     std::string gl;  ///< empty: the first that can be had
     std::string sampleFormat = "r32f";
+    std::string primitives = "device";
 };
 
 /// --repair and what belongs to it, as typed.

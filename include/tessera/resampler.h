@@ -36,12 +36,22 @@ enum class Route {
     pass,
 };
 
+/// Who makes what an OpenGL algorithm draws or scans, from the elements near the points. Samples don't depend
+/// on it.
+enum class Primitives {
+    device,    ///< compute shaders, where the whole mesh can stay on the device
+    processor  ///< as Weiler and Ertl balanced it in 2001; uploaded region by region
+};
+/// "device", "processor".
+std::string_view nameOf(Primitives primitives);
+
 /// What BoundResampler runs with.
 struct BindOptions {
     /// One of Resampler::targets(); empty: the first.
     std::string target;
     SampleFormat format = SampleFormat::r32f;
     Route route = Route::automatic;
+    Primitives primitives = Primitives::device;
     /// Of the mesh that is bound, to share it with others; null: one of its own, built when it pays.
     std::shared_ptr<const SharedElementIndex> index = nullptr;
     /// Bound on WorkMemory, bytes, without its fixed part; less than its least counts as that. 0: its most.

@@ -5,12 +5,12 @@
 #include <tuple>
 #include <utility>
 
+#include "hybrid/shaders.h"
+
 namespace tessera {
 
 namespace {
 
-/// Beyond this, corners lose too much in the rasteriser's fixed point.
-constexpr double kLargestExtent = 1000;
 /// A pixel centre this close to a polygon's bounding rectangle may be covered by it.
 constexpr double kMargin = 0x1p-8;
 /// Polygons that would have to grow by more make way for rectangles.
@@ -146,7 +146,7 @@ void emitSlice(const SlabInput& input, const SliceElement& e, int layer, double 
         if (e.isSmall && !tighten(polygon, margin, {e.first[axes.s], e.first[axes.t]}, rect)) return;
     }
     ++batch.polygons;
-    if (!e.isSmall && polygon.corners > 0 && polygon.error < kMostError && extent <= kLargestExtent) {
+    if (!e.isSmall && polygon.corners > 0 && polygon.error < kMostError && extent <= kLargestPolygon) {
         for (int c = 0; c < polygon.corners; ++c) {
             polygon.corner[c][0] += e.first[axes.s] + 0.5;
             polygon.corner[c][1] += e.first[axes.t] + 0.5;
@@ -222,6 +222,10 @@ void SlicePolygonGenerator::emitPublished(const SlabInput& input, SliceBatch& ba
             for (std::uint32_t k = 2; k < std::uint32_t(cut.corners); ++k)
                 list.indices.insert(list.indices.end(), {first, first + k - 1, first + k});
         }
+}
+
+const ShaderText& SlicePolygonGenerator::shader() const {
+    return shaders::hybrid::kSlicePolygons;
 }
 
 }  // namespace tessera

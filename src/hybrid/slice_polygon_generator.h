@@ -12,6 +12,7 @@ namespace tessera {
 class SlicePolygonGenerator : public SliceGenerator {
   public:
     void emit(const SlabInput& input, SliceBatch& batch) const override;
+    const ShaderText& shader() const override;
     /// Polygons whose corners carry the values of the cut edges, to be filled with Gouraud shading.
     void emitPublished(const SlabInput& input, SliceBatch& batch) const override;
 };

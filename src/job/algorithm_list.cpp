@@ -22,7 +22,12 @@ Contestant contestantOf(const std::string& entry, const BindOptions& options) {
     contestant.resampler = &findResampler(entry.substr(0, colon));
     contestant.options = bindOptionsFor(*contestant.resampler, options);
     if (colon == std::string::npos) return contestant;
-    contestant.options.target = entry.substr(colon + 1);
+    const std::string word = entry.substr(colon + 1);
+    if (contestant.resampler->info().isOnDevice && word == nameOf(Primitives::processor)) {
+        contestant.options.primitives = Primitives::processor;
+        return contestant;
+    }
+    contestant.options.target = word;
     const std::vector<std::string> targets = contestant.resampler->targets();
     if (std::find(targets.begin(), targets.end(), contestant.options.target) == targets.end()) {
         if (contestant.resampler->info().isOnDevice) checkGlTarget(contestant.options.target);

@@ -14,6 +14,12 @@ std::string glslOf(float value) {
     return "uintBitsToFloat(" + std::to_string(std::bit_cast<std::uint32_t>(value)) + "u)";
 }
 
+void grow(GlContext& context, GlBuffer& buffer, std::size_t bytes) {
+    if (buffer && buffer.bytes() >= std::int64_t(bytes)) return;
+    buffer = GlBuffer();  // the old one goes first, for its memory
+    buffer = GlBuffer(context, std::int64_t(bytes + bytes / 4), 0);
+}
+
 GlProgram makeComputeProgram(GlContext& context, const ShaderText& main, std::vector<ShaderText> shared,
                              std::vector<ShaderDefine> defines) {
     defines.push_back({"GROUP_THREADS", glslOf(kGroupThreads)});

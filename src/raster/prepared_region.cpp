@@ -240,9 +240,13 @@ int chooseLayerAxis(const TetMesh& mesh, const NodeFrame& frame, const Execution
         }
         for (int a = 0; a < 3; ++a) pairs[a] += sums[a];
     });
+    return layerAxisOf({double(pairs[0]), double(pairs[1]), double(pairs[2])});
+}
+
+int layerAxisOf(const Vec3d& pairs) {
     int best = 2;
     for (const int a : {1, 0})
-        if (double(pairs[a]) < 0.875 * double(pairs[best])) best = a;
+        if (pairs[a] < 0.875 * pairs[best]) best = a;
     return best;
 }
 

@@ -105,5 +105,7 @@ ActiveElements listActiveElements(const PreparedRegion& region, const SliceAxes&
 /// The slice axis with the fewest pairs of element and slice, over the whole mesh: z unless another is better
 /// by an eighth, since memory runs along x.
 int chooseLayerAxis(const TetMesh& mesh, const NodeFrame& frame, const Execution& execution);
+/// The same by the pairs along each axis.
+int layerAxisOf(const Vec3d& pairs);
 
 }  // namespace tessera

@@ -22,9 +22,9 @@ constexpr const char* kDepthScale = "1.220703125e-4";
 /// Of a scan: dispatches that may be made once more, and bytes of what it notes.
 constexpr std::size_t kMostAgain = kMostScanRuns + 2;
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
-/// An emulated device keeps some hundred bytes for each until it has drawn them; a multiple of a triangle's
-/// corners.
-constexpr std::size_t kVerticesAtOnce = std::size_t(3) << 14;
+/// An emulated device keeps some hundred bytes of each corner until it has drawn it.
+constexpr std::size_t kCornersAtOnce = std::size_t(3) << 14;
+constexpr std::size_t kQuadIndices = 6, kQuadsAtOnce = kCornersAtOnce / kQuadIndices;
 constexpr GLenum kFragmentInvocations = 0x82F4;  // GL_ARB_pipeline_statistics_query
 
 int levelsOf(SampleFormat format) {
@@ -221,8 +221,8 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
 }
 
 void RasterDevice::begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs,
-                         std::size_t pass, const DeviceMesh& mesh) {
-    const bool hasGeometry = prepare(context, points, inputs, pass, true);
+                         std::size_t pass, const DeviceMesh& mesh, bool scans) {
+    const bool hasGeometry = prepare(context, points, inputs, pass, scans);
     records_.makeChannels(context, mesh, pass, inputs.format);
     isReady_ = hasGeometry;
 }
@@ -244,17 +244,23 @@ bool RasterDevice::prepare(GlContext& context, const IndexBox& points, const Ras
 }
 
 /// At most two parts are under way on an emulated device.
-void RasterDevice::drawInParts(GlContext& context, GLenum mode, std::size_t count) {
+void RasterDevice::drawInParts(GlContext& context, Shape shape, std::size_t count) {
     const GlFunctions& gl = context.functions();
     const bool isEmulated = thread_.info().isSoftware;
-    const std::size_t most = isEmulated ? kVerticesAtOnce : count;
+    const std::size_t most = shape == Shape::quads       ? kQuadsAtOnce
+                             : !isEmulated               ? count
+                             : shape == Shape::triangles ? kCornersAtOnce / 3
+                                                         : kCornersAtOnce;
     for (std::size_t first = 0; first < count; first += most) {
         const auto ofPart = GLsizei(std::min(most, count - first));
-        if (mode == GL_POINTS)
-            gl.DrawArrays(mode, GLint(first), ofPart);
+        if (shape == Shape::points)
+            gl.DrawArrays(GL_POINTS, GLint(first), ofPart);
+        else if (shape == Shape::triangles)
+            gl.DrawElements(GL_TRIANGLES, 3 * ofPart, GL_UNSIGNED_INT,
+                            reinterpret_cast<const void*>(3 * first * sizeof(std::uint32_t)));
         else
-            gl.DrawElements(mode, ofPart, GL_UNSIGNED_INT,
-                            reinterpret_cast<const void*>(first * sizeof(std::uint32_t)));
+            gl.DrawElementsBaseVertex(GL_TRIANGLES, GLsizei(kQuadIndices) * ofPart, GL_UNSIGNED_INT, nullptr,
+                                      GLint(4 * first));
         if (!isEmulated) continue;
         GlFence part(context);
         if (lastPart_) lastPart_.wait();
@@ -263,7 +269,7 @@ void RasterDevice::drawInParts(GlContext& context, GLenum mode, std::size_t coun
 }
 
 void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array,
-                                  GLenum mode, std::size_t count) {
+                                  Shape shape, std::size_t count) {
     const GlFunctions& gl = context.functions();
     const GlProgram& used = program(context, variant);
     gl.UseProgram(used.id());
@@ -279,7 +285,7 @@ void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, co
     gl.Enable(GL_PROGRAM_POINT_SIZE);
     gl.ProvokingVertex(GL_FIRST_VERTEX_CONVENTION);
     gl.BindFramebuffer(GL_DRAW_FRAMEBUFFER, target_.framebuffer.id());
-    if (isLayered_) return drawInParts(context, mode, count);
+    if (isLayered_) return drawInParts(context, shape, count);
     const GLenum buffers[2] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
     for (int layer = 0; layer < size_.z; ++layer) {
         target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT0, target_.codes, layer);
@@ -287,7 +293,7 @@ void RasterDevice::drawPrimitives(GlContext& context, const Variant& variant, co
         if (target_.coverage) target_.framebuffer.attachLayer(GL_COLOR_ATTACHMENT1, target_.coverage, layer);
         gl.NamedFramebufferDrawBuffers(target_.framebuffer.id(), target_.coverage ? 2 : 1, buffers);
         gl.ProgramUniform1i(used.id(), used.uniform("onlyLayer"), layer);
-        drawInParts(context, mode, count);
+        drawInParts(context, shape, count);
     }
 }
 
@@ -295,43 +301,56 @@ void RasterDevice::drawList(GlContext& context, const PrimitiveList& list, bool 
     const GlFunctions& gl = context.functions();
     const Stream& geometry = isThin ? thinGeometry_ : easyGeometry_;
     const Stream& channels = isThin ? thinChannels_ : easyChannels_;
-    if (list.sprites.empty() && list.indices.empty()) return;
+    if (list.sprites.empty() && list.corners.empty()) return;
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, geometry.slots[geometry.filled].buffer.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, channels.slots[channels.filled].buffer.id());
-    Variant variant{Stage::sprites, isThin, channels_, levelsOf(format_)};
     if (!list.sprites.empty()) {
-        if (!spriteArray_) {
-            spriteArray_ = GlVertexArray(context);
-            gl.EnableVertexArrayAttrib(spriteArray_.id(), 0);
-            gl.VertexArrayAttribIFormat(spriteArray_.id(), 0, 3, GL_UNSIGNED_INT, 0);
-            gl.VertexArrayAttribBinding(spriteArray_.id(), 0, 0);
-        }
-        const GLuint buffer = upload(context, vertices_, list.sprites);
-        gl.VertexArrayVertexBuffer(spriteArray_.id(), 0, buffer, 0, sizeof(Sprite));
-        drawPrimitives(context, variant, spriteArray_, GL_POINTS, list.sprites.size());
-        counts_.vertices += std::int64_t(list.sprites.size());
+        drawSprites(context, upload(context, vertices_, list.sprites), list.sprites.size(), isThin);
         release(context, vertices_);
     }
-    if (!list.indices.empty()) {
-        variant.stage = Stage::polygons;
-        if (!polygonArray_) {
-            polygonArray_ = GlVertexArray(context);
-            const GLuint array = polygonArray_.id();
-            gl.EnableVertexArrayAttrib(array, 0);
-            gl.VertexArrayAttribFormat(array, 0, 2, GL_FLOAT, GL_FALSE, 0);
-            gl.VertexArrayAttribBinding(array, 0, 0);
-            gl.EnableVertexArrayAttrib(array, 1);
-            gl.VertexArrayAttribIFormat(array, 1, 2, GL_UNSIGNED_INT, offsetof(PolygonVertex, record));
-            gl.VertexArrayAttribBinding(array, 1, 0);
-        }
-        const GLuint buffer = upload(context, vertices_, list.vertices);
-        gl.VertexArrayVertexBuffer(polygonArray_.id(), 0, buffer, 0, sizeof(PolygonVertex));
-        gl.VertexArrayElementBuffer(polygonArray_.id(), upload(context, indices_, list.indices));
-        drawPrimitives(context, variant, polygonArray_, GL_TRIANGLES, list.indices.size());
-        counts_.vertices += std::int64_t(list.vertices.size());
+    if (!list.corners.empty()) {
+        drawPolygons(context, upload(context, vertices_, list.corners), list.corners.size() / 4, isThin);
         release(context, vertices_);
-        release(context, indices_);
     }
+}
+
+void RasterDevice::drawSprites(GlContext& context, GLuint buffer, std::size_t count, bool areThin) {
+    const GlFunctions& gl = context.functions();
+    if (!spriteArray_) {
+        spriteArray_ = GlVertexArray(context);
+        gl.EnableVertexArrayAttrib(spriteArray_.id(), 0);
+        gl.VertexArrayAttribIFormat(spriteArray_.id(), 0, 3, GL_UNSIGNED_INT, 0);
+        gl.VertexArrayAttribBinding(spriteArray_.id(), 0, 0);
+    }
+    gl.VertexArrayVertexBuffer(spriteArray_.id(), 0, buffer, 0, sizeof(Sprite));
+    drawPrimitives(context, {Stage::sprites, areThin, channels_, levelsOf(format_)}, spriteArray_,
+                   Shape::points, count);
+    counts_.vertices += std::int64_t(count);
+}
+
+void RasterDevice::drawPolygons(GlContext& context, GLuint buffer, std::size_t count, bool areThin) {
+    const GlFunctions& gl = context.functions();
+    if (!polygonArray_) {
+        // Two triangles each; the first corner provokes.
+        std::vector<std::uint32_t> indices;
+        for (std::uint32_t corner = 0; corner < 4 * kQuadsAtOnce; corner += 4)
+            for (const std::uint32_t k : {0, 1, 2, 0, 2, 3}) indices.push_back(corner + k);
+        GlBuffer quads(context, std::span(indices));
+        polygonArray_ = GlVertexArray(context);
+        const GLuint array = polygonArray_.id();
+        gl.EnableVertexArrayAttrib(array, 0);
+        gl.VertexArrayAttribFormat(array, 0, 2, GL_FLOAT, GL_FALSE, 0);
+        gl.VertexArrayAttribBinding(array, 0, 0);
+        gl.EnableVertexArrayAttrib(array, 1);
+        gl.VertexArrayAttribIFormat(array, 1, 2, GL_UNSIGNED_INT, offsetof(PolygonVertex, record));
+        gl.VertexArrayAttribBinding(array, 1, 0);
+        gl.VertexArrayElementBuffer(array, quads.id());
+        quadIndices_ = std::move(quads);
+    }
+    gl.VertexArrayVertexBuffer(polygonArray_.id(), 0, buffer, 0, sizeof(PolygonVertex));
+    drawPrimitives(context, {Stage::polygons, areThin, channels_, levelsOf(format_)}, polygonArray_,
+                   Shape::quads, count);
+    counts_.vertices += std::int64_t(4 * count);
 }
 
 void RasterDevice::makeAlphaTexture(GlContext& context) {
@@ -379,7 +398,7 @@ void RasterDevice::drawPublished(GlContext& context, const PublishedList& list) 
     gl.VertexArrayElementBuffer(array.id(), upload(context, indices_, list.indices));
     drawPrimitives(context,
                    {isSilhouette ? Stage::silhouettes : Stage::gouraud, false, channels_, levelsOf(format_)},
-                   array, GL_TRIANGLES, list.indices.size());
+                   array, Shape::triangles, list.indices.size() / 3);
     counts_.vertices += std::int64_t(list.silhouettes.size() + list.polygons.size());
     release(context, vertices_);
     release(context, indices_);
@@ -411,6 +430,34 @@ void RasterDevice::draw(GlContext& context, const SliceBatch& batch) {
     stopTimer(context);
 }
 
+void RasterDevice::draw(GlContext& context, const DeviceMesh& mesh, const ShaderText& algorithm,
+                        const LayerCounts& layers, std::int64_t mostBytes) {
+    if (!isReady_) return;
+    const GlFunctions& gl = context.functions();
+    const ScanRecords records = records_.records();
+    for (const PrimitiveMaker::Slab& slab : PrimitiveMaker::slabs(layers, mostBytes))
+        for (std::size_t kind = 0; kind < kKinds; ++kind) {
+            if (slab.counts[kind] == 0) continue;
+            startTimer(context);
+            {
+                const FragmentCount counter(countsFragments_ ? &fragmentCounters_[usedQueries_] : nullptr);
+                gl.MemoryBarrier(GL_ALL_BARRIER_BITS);  // what is drawn by now has been read
+                const auto made = primitives_.make(context, records_, mesh, axes_, algorithm, slab, kind);
+                const bool areThin = isThinKind(kind);
+                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0,
+                                  areThin ? records.thinGeometry : records.easyGeometry);
+                gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 1,
+                                  areThin ? records.thinChannels : records.easyChannels);
+                if (isLargeKind(kind))
+                    drawPolygons(context, made.buffer, made.count, areThin);
+                else
+                    drawSprites(context, made.buffer, made.count, areThin);
+                counts_.polygons += std::int64_t(made.count);
+            }
+            stopTimer(context);
+        }
+}
+
 void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& points) {
     if (!isReady_ || points.empty()) return;
     const GlFunctions& gl = context.functions();
@@ -427,7 +474,7 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
     }
     gl.VertexArrayVertexBuffer(pointArray_.id(), 0, upload(context, vertices_, points), 0,
                                sizeof(DecidedPoint));
-    drawPrimitives(context, {Stage::points, false, channels_, levelsOf(format_)}, pointArray_, GL_POINTS,
+    drawPrimitives(context, {Stage::points, false, channels_, levelsOf(format_)}, pointArray_, Shape::points,
                    points.size());
     counts_.vertices += std::int64_t(points.size());
     release(context, vertices_);

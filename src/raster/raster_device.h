@@ -16,6 +16,7 @@
 #include "raster/hard_elements.h"
 #include "raster/point_scan.h"
 #include "raster/prepared_region.h"
+#include "raster/primitive_maker.h"
 #include "raster/record_maker.h"
 #include "tessera/resampler.h"
 
@@ -25,6 +26,7 @@ namespace tessera {
 struct RasterCounts {
     double uploadMs = 0, renderMs = 0, readBackMs = 0;
     std::int64_t fragments = 0, vertices = 0, uploadBytes = 0, readBackBytes = 0;
+    std::int64_t polygons = 0;  ///< of primitives that the device made
 };
 
 /// Memory that the device copies to and the processor reads.
@@ -59,9 +61,9 @@ class RasterDevice {
     /// @param scans the region is scanned, not drawn.
     void begin(GlContext& context, const PreparedRegion& region, const RasterInputs& inputs,
                std::size_t pass = 0, bool scans = false);
-    /// The same of the region that records() are of, which is scanned; makes their channels.
+    /// The same of the region that records() are of; makes their channels.
     void begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs, std::size_t pass,
-               const DeviceMesh& mesh);
+               const DeviceMesh& mesh, bool scans);
     /// Of records that are made on the device.
     RecordMaker& records() { return records_; }
     /// Samples the region by compute shaders, layers along z. The boxes and the places of the points are
@@ -74,6 +76,10 @@ class RasterDevice {
     void countUpload(std::int64_t bytes) { counts_.uploadBytes += bytes; }
     /// Draws what a generator made. Each slice may be drawn by one call only.
     void draw(GlContext& context, const SliceBatch& batch);
+    /// Draws the region that records() are of by primitives that the device makes, at most so many bytes at a
+    /// time.
+    void draw(GlContext& context, const DeviceMesh& mesh, const ShaderText& algorithm,
+              const LayerCounts& layers, std::int64_t mostBytes);
     void draw(GlContext& context, const std::vector<DecidedPoint>& points);
     /// Copies the region to the processor's memory, which goes on while the device is given other work.
     RasterImage readBack(GlContext& context);
@@ -163,12 +169,19 @@ class RasterDevice {
     void stopTimer(GlContext& context);
     void clear(GlContext& context);
     void drawList(GlContext& context, const PrimitiveList& list, bool isThin);
+    void drawSprites(GlContext& context, GLuint buffer, std::size_t count, bool areThin);
+    void drawPolygons(GlContext& context, GLuint buffer, std::size_t count, bool areThin);
     void drawPublished(GlContext& context, const PublishedList& list);
     void makeAlphaTexture(GlContext& context);
-    /// @param mode GL_POINTS, or GL_TRIANGLES by indices. @param count of vertices or indices.
-    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array, GLenum mode,
+    enum class Shape {
+        points,
+        triangles,  ///< by indices, three each
+        quads       ///< of four vertices each
+    };
+    /// @param count of shapes.
+    void drawPrimitives(GlContext& context, const Variant& variant, const GlVertexArray& array, Shape shape,
                         std::size_t count);
-    void drawInParts(GlContext& context, GLenum mode, std::size_t count);
+    void drawInParts(GlContext& context, Shape shape, std::size_t count);
     /// Waits until the device has read what stood there.
     GLuint upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count);
     template <class T, class Memory>
@@ -184,6 +197,8 @@ class RasterDevice {
     GlFence lastPart_;  ///< of a device that is emulated
     std::map<Variant, GlProgram> programs_;
     RecordMaker records_;
+    PrimitiveMaker primitives_;
+    GlBuffer quadIndices_;
     Target target_;
     std::shared_ptr<FreeBuffers> freeBuffers_ = std::make_shared<FreeBuffers>();
     Stream easyGeometry_{kOfRegions}, easyChannels_{kOfRegions}, thinGeometry_{kOfRegions},

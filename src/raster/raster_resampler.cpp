@@ -48,6 +48,7 @@ class BoundRaster : public BoundResampler {
           format_(options.format),
           isPublished_(isPublished),
           isScan_(generator == nullptr),
+          primitives_(options.primitives),
           workBytes_(options.workBytes),
           platform_(platform),
           target_(nameOf(platform)),
@@ -180,6 +181,7 @@ class BoundRaster : public BoundResampler {
     SampleFormat format_;
     bool isPublished_;
     bool isScan_;
+    Primitives primitives_;
     std::int64_t workBytes_;
     GlPlatform platform_;
     std::string target_;
@@ -236,6 +238,7 @@ ResampleStatistics BoundRaster::Run::all() {
     statistics_.addMs(stage::render, counts.renderMs);
     statistics_.addMs(stage::readBack, counts.readBackMs);
     statistics_.add(counted::fragments, counts.fragments);
+    statistics_.add(counted::polygons, counts.polygons);
     statistics_.add(counted::vertices, counts.vertices);
     statistics_.add(counted::uploadBytes, counts.uploadBytes);
     statistics_.add(counted::readBackBytes, counts.readBackBytes);
@@ -249,6 +252,9 @@ void BoundRaster::Run::plan() {
     left_.assign(regions.begin(), regions.end());
     axes_ = SliceAxes::along(2);
     if (deviceMesh_) {
+        if (!slots_ && !bound_.isScan_)
+            axes_ = SliceAxes::along(
+                deviceMesh_->layerAxis({lattice_.uWorld.x, lattice_.vWorld.y, lattice_.wWorld.z}));
         device_.thread().run(
             [&](GlContext& context) { device_.records().place(context, *deviceMesh_, lattice_); });
     } else {
@@ -266,8 +272,9 @@ void BoundRaster::Run::plan() {
 }
 
 std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
+    if (bound_.isPublished_ || bound_.primitives_ == Primitives::processor) return nullptr;
     // What is near a few boxes is gathered for them, and not worth the way to the device.
-    if (!bound_.isScan_ || part_ || mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
+    if (part_ || mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
     // An emulated device's memory is this process's own.
     const WorkMemory work = rasterWorkMemory(int(channels_.size()));
     const std::int64_t bytes = bound_.workBytes_ > 0 ? std::max(bound_.workBytes_, work.least) : work.most;
@@ -339,13 +346,16 @@ RecordMaker::Made BoundRaster::Run::makeRecords(RegionJob& job) {
         const std::int64_t bytes = RecordMaker::bytesFor(near, 0, channels);
         if (bytes > budget_.recordBytes && cut(job.region, 1 + bytes / budget_.recordBytes)) continue;
         const auto make = [&](std::int64_t most) {
+            const std::optional<int> axis = bound_.isScan_ ? std::nullopt : std::optional(axes_.l);
             return device_.thread().run(
-                [&](GlContext& context) { return maker.makeGeometry(context, *deviceMesh_, most); });
+                [&](GlContext& context) { return maker.makeGeometry(context, *deviceMesh_, most, axis); });
         };
         std::optional<RecordMaker::Made> made = make(budget_.recordBytes);
         if (!made && cut(job.region, 2)) continue;
         if (!made) made = make(std::numeric_limits<std::int64_t>::max());
         statistics_.add(counted::elementBlockPairs, near);
+        for (const auto& ofLayer : made->layers)
+            for (const std::uint32_t count : ofLayer) statistics_.add(counted::elementSlicePairs, count);
         return *std::move(made);
     }
 }
@@ -353,25 +363,30 @@ RecordMaker::Made BoundRaster::Run::makeRecords(RegionJob& job) {
 void BoundRaster::Run::startOnDevice() {
     RegionJob& job = jobs_.emplace_back();
     const Timer timer;
-    RecordMaker::Made made = makeRecords(job);
+    const auto made = std::make_shared<const RecordMaker::Made>(makeRecords(job));
     statistics_.addMs(stage::bin, timer.elapsedMs());
-    job.prepared.hard = std::move(made.hard);
+    job.prepared.hard = made->hard;
     statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
     if (!job.prepared.hard.empty()) placeNodes();
     const RasterInputs inputs = this->inputs();
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
         const bool isLast = pass + 1 == inputs.passCount();
         job.draws.push_back(device_.thread().post([this, &job, inputs, pass](GlContext& context) {
-            device_.begin(context, job.region.points, inputs, pass, *deviceMesh_);
+            device_.begin(context, job.region.points, inputs, pass, *deviceMesh_, bound_.isScan_);
         }));
         auto points = std::make_shared<const std::vector<DecidedPoint>>(
             decideHardElements(inputs, job.prepared, pass, execution_));
-        job.draws.push_back(
-            device_.thread().post([this, points, runs = made.runs, pass, isLast](GlContext& context) {
+        job.draws.push_back(device_.thread().post([this, points, made, pass, isLast](GlContext& context) {
+            if (bound_.isScan_) {
                 ScanRecords records = device_.records().records();
-                records.runs = runs;
+                records.runs = made->runs;
                 device_.scan(context, records, *points, pass, isLast);
-            }));
+                return;
+            }
+            device_.draw(context, *deviceMesh_, bound_.generator_->shader(), made->layers,
+                         budget_.queueBytes);
+            device_.draw(context, *points);
+        }));
         postResult(job, pass);
     }
 }

@@ -8,7 +8,6 @@
 #include "base/check.h"
 #include "base/parallel.h"
 #include "index_space/exact_scan.h"
-#include "raster/dispatch.h"
 #include "raster/shaders.h"
 
 namespace tessera {
@@ -17,14 +16,10 @@ namespace {
 
 constexpr std::uint32_t kDecidedBit = 1u << 31;
 constexpr std::size_t kFan = 32;  ///< of the levels of sums
+constexpr std::int64_t kChunk = 16384;
 constexpr std::size_t kOperations = 8, kOperands = 4096;
 constexpr std::size_t kRunCounts = 2 * (kPartSizes + 1) + 1;
-
-void grow(GlContext& context, GlBuffer& buffer, std::size_t bytes) {
-    if (buffer && buffer.bytes() >= std::int64_t(bytes)) return;
-    buffer = GlBuffer();  // the old one goes first, for its memory
-    buffer = GlBuffer(context, std::int64_t(bytes + bytes / 4), 0);
-}
+constexpr std::size_t kLayers = std::size_t(kCellEdge) + 1;  ///< and the one behind the last
 
 void clear(GlContext& context, const GlBuffer& buffer, std::size_t bytes) {
     context.functions().ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, GLsizeiptr(bytes), GL_RED_INTEGER,
@@ -44,6 +39,17 @@ void operate(double a, double b, double (&results)[kOperations]) {
     const double made[kOperations] = {
         a + b, a - b, a * b, a / b, std::floor(a), std::sqrt(std::fabs(a)), a * b + a, double(float(a))};
     std::ranges::copy(made, results);
+}
+
+/// Zero where that isn't finite.
+Vec3d sizeOf(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) {
+    Vec3d low = mesh.points[tet[0]], high = low;
+    for (const std::uint32_t node : tet) {
+        low = glm::min(low, mesh.points[node]);
+        high = glm::max(high, mesh.points[node]);
+    }
+    const Vec3d size = high - low;
+    return std::isfinite(size.x + size.y + size.z) ? size : Vec3d(0);
 }
 
 }  // namespace
@@ -67,7 +73,7 @@ DeviceMesh::Source::Source(const TetMesh& mesh, std::span<const ChannelCoding> c
         for (const ChannelCoding& coding : codings) {
             const bool isOfCells = coding.isOfCells();
             const std::size_t place = isOfCells ? k++ : n++;
-            parallelForChunks(execution, isOfCells ? mesh.elementCount() : mesh.nodeCount(), 16384,
+            parallelForChunks(execution, isOfCells ? mesh.elementCount() : mesh.nodeCount(), kChunk,
                               [&](std::int64_t begin, std::int64_t end) {
                                   for (std::int64_t i = begin; i < end; ++i)
                                       if (isOfCells)
@@ -80,18 +86,23 @@ DeviceMesh::Source::Source(const TetMesh& mesh, std::span<const ChannelCoding> c
         }
     }
     tets.resize(mesh.tets.size());
-    parallelForChunks(execution, mesh.elementCount(), 16384, [&](std::int64_t begin, std::int64_t end) {
+    std::vector<Vec3d> sizes((tets.size() + kChunk - 1) / kChunk, Vec3d(0));
+    parallelForChunks(execution, mesh.elementCount(), kChunk, [&](std::int64_t begin, std::int64_t end) {
         for (std::int64_t e = begin; e < end; ++e) {
             auto& tet = tets[std::size_t(e)];
             for (std::size_t k = 0; k < 4; ++k) tet[k] = std::uint32_t(mesh.tets[std::size_t(e)][k]);
+            sizes[std::size_t(begin / kChunk)] += sizeOf(mesh, tet);
             for (const ChannelCoding& coding : channels)
                 if (!isSafeOnDevice(coding, mesh, std::int32_t(e))) tet[0] |= kDecidedBit;
         }
     });
+    for (const Vec3d& size : sizes) sizesWorld += size;
 }
 
 DeviceMesh::DeviceMesh(GlContext& context, const Source& source)
-    : nodeCount_(source.whole.points.size()), elementCount_(source.whole.tets.size()) {
+    : nodeCount_(source.whole.points.size()),
+      elementCount_(source.whole.tets.size()),
+      sizesWorld_(source.sizesWorld) {
     nodes_ = GlBuffer(context, std::span(source.whole.points));
     tets_ = GlBuffer(context, std::span(source.tets));
     for (const Source::Pass& pass : source.passes)
@@ -109,74 +120,54 @@ std::int64_t DeviceMesh::bytesOf(const TetMesh& mesh, std::span<const ChannelCod
     return aNode * mesh.nodeCount() + anElement * mesh.elementCount();
 }
 
+int DeviceMesh::layerAxis(const Vec3d& spacingWorld) const {
+    return layerAxisOf(sizesWorld_ / spacingWorld);
+}
+
 std::int64_t DeviceMesh::uploadedBytes() const {
     std::int64_t bytes = nodes_.bytes() + tets_.bytes();
     for (const Pass& pass : passes_) bytes += pass.nodeCodes.bytes() + pass.cellCodes.bytes();
     return bytes;
 }
 
-/// A program in use, whose uniforms are set by name.
-struct RecordMaker::Use {
-    GlContext& context;
-    const GlProgram& program;
-
-    const GlFunctions& gl() const { return context.functions(); }
-    GLint at(const char* name) const { return program.uniform(name); }
-    void bind(GLuint binding, const GlBuffer& buffer) const {
-        gl().BindBufferBase(GL_SHADER_STORAGE_BUFFER, binding, buffer.id());
-    }
-    void set(const char* name, std::size_t value) const {
-        gl().ProgramUniform1ui(program.id(), at(name), GLuint(value));
-    }
-    void set(const char* name, const Vec3i& value) const {
-        gl().ProgramUniform3i(program.id(), at(name), value.x, value.y, value.z);
-    }
-    void set(const char* name, const Vec3d& value) const {
-        gl().ProgramUniform3d(program.id(), at(name), value.x, value.y, value.z);
-    }
-    void flag(const char* name, bool value) const { gl().ProgramUniform1i(program.id(), at(name), value); }
-    void run(std::size_t threads) const {
-        const auto groups = groupsOf(threads);
-        gl().UseProgram(program.id());
-        gl().DispatchCompute(groups[0], groups[1], groups[2]);
-        gl().MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
-    }
-};
+std::vector<ShaderDefine> recordDefines() {
+    return {{"PLANE_ROUNDING", glslOf(kPlaneRounding)},
+            {"MOST_PLANE_ERROR", glslOf(kMostPlaneError)},
+            {"LARGEST_HEIGHT", glslOf(kLargestHeight)},
+            {"LARGEST_MARGIN", glslOf(kLargestMargin)},
+            {"LARGEST_FLOAT", glslOf(double(std::numeric_limits<float>::max()))},
+            {"CORNER_FACTOR", glslOf(kCornerFactor)},
+            {"FLOAT_ROUNDING", glslOf(kFloatRounding)},
+            {"FLOAT_UNIT", glslOf(kFloatUnit)},
+            {"SLACK_FACTOR", glslOf(kSlackFactor)},
+            {"CELL_EDGE", glslOf(double(kCellEdge))},
+            {"LAYERS", glslOf(kLayers)},
+            {"BOX_SLACK", glslOf(kBoxSlack)},
+            {"MARGIN", glslOf(float(2 * kLargestMargin))},
+            {"ROUGH_ERROR", glslOf(0x1p-16f)},
+            {"ROUGH", glslOf(0x1p-21f)},
+            {"SMALL_EXTENT", std::to_string(kSmallExtent)},
+            {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
+            {"PART_SIZES", glslOf(kPartSizes)},
+            {"TILE_SHIFT", std::to_string(kTileShift)},
+            {"TILES_AN_EDGE", glslOf(std::size_t(kTilesAnEdge))},
+            {"TILES", glslOf(kTiles)},
+            {"SMALL_SIZES", glslOf(kSmallSizes)},
+            {"SMALL_BUCKETS", glslOf(kSmallBuckets)},
+            {"BUCKETS", glslOf(kBuckets)},
+            {"FAN", glslOf(kFan)},
+            {"OPERATIONS", glslOf(kOperations)}};
+}
 
 const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int channels) {
     const auto found = programs_.find({stage, channels});
     if (found != programs_.end()) return found->second;
     namespace text = shaders::raster;
-    const std::vector<ShaderDefine> defines{
-        {"CHANNELS", std::to_string(channels)},
-        {"PLANE_ROUNDING", glslOf(kPlaneRounding)},
-        {"MOST_PLANE_ERROR", glslOf(kMostPlaneError)},
-        {"LARGEST_HEIGHT", glslOf(kLargestHeight)},
-        {"LARGEST_MARGIN", glslOf(kLargestMargin)},
-        {"LARGEST_FLOAT", glslOf(double(std::numeric_limits<float>::max()))},
-        {"CORNER_FACTOR", glslOf(kCornerFactor)},
-        {"FLOAT_ROUNDING", glslOf(kFloatRounding)},
-        {"FLOAT_UNIT", glslOf(kFloatUnit)},
-        {"SLACK_FACTOR", glslOf(kSlackFactor)},
-        {"CELL_EDGE", glslOf(double(kCellEdge))},
-        {"BOX_SLACK", glslOf(kBoxSlack)},
-        {"MARGIN", glslOf(float(2 * kLargestMargin))},
-        {"ROUGH_ERROR", glslOf(0x1p-16f)},
-        {"ROUGH", glslOf(0x1p-21f)},
-        {"SMALL_EXTENT", std::to_string(kSmallExtent)},
-        {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
-        {"PART_SIZES", glslOf(kPartSizes)},
-        {"TILE_SHIFT", std::to_string(kTileShift)},
-        {"TILES_AN_EDGE", glslOf(std::size_t(kTilesAnEdge))},
-        {"TILES", glslOf(kTiles)},
-        {"SMALL_SIZES", glslOf(kSmallSizes)},
-        {"SMALL_BUCKETS", glslOf(kSmallBuckets)},
-        {"BUCKETS", glslOf(kBuckets)},
-        {"FAN", glslOf(kFan)},
-        {"OPERATIONS", glslOf(kOperations)}};
     const auto made = [&](const ShaderText& main, std::vector<ShaderText> shared) {
-        auto all = defines;
+        std::vector<ShaderDefine> all = recordDefines();
+        all.push_back({"CHANNELS", std::to_string(channels)});
         if (stage == Stage::thinGeometry) all.push_back({"THIN"});
+        if (stage == Stage::drawnGeometry) all.push_back({"DRAWN"});
         shared.insert(shared.begin(), text::kThreads);
         return makeComputeProgram(context, main, std::move(shared), std::move(all));
     };
@@ -195,6 +186,10 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
                 return made(text::kRecordGeometry,
                             {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
                              text::kScanBoxes, text::kScanBuckets});
+            case Stage::drawnGeometry:
+                return made(text::kRecordGeometry,
+                            {text::kRecordTypes, text::kPlacedNodes, text::kElementShape, text::kRanks,
+                             text::kScanBoxes, text::kPixelRows, text::kTightenBox});
             case Stage::channels:
                 return made(text::kRecordChannels, {text::kRecordTypes, text::kPlacedNodes,
                                                     text::kElementShape, text::kRanks, text::kScanBoxes});
@@ -210,7 +205,7 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
     return programs_.emplace(std::pair(stage, channels), ofStage()).first->second;
 }
 
-RecordMaker::Use RecordMaker::use(GlContext& context, Stage stage, int channels) {
+ComputeUse RecordMaker::use(GlContext& context, Stage stage, int channels) {
     return {context, program(context, stage, channels)};
 }
 
@@ -224,7 +219,7 @@ bool RecordMaker::isExact(GlContext& context) {
     }
     const GlBuffer source(context, std::span(operands));
     const GlBuffer results(context, std::int64_t(kOperands * kOperations * sizeof(double)), 0);
-    const Use test = use(context, Stage::doubles);
+    const ComputeUse test = use(context, Stage::doubles);
     test.bind(0, source);
     test.bind(1, results);
     test.set("count", kOperands);
@@ -244,7 +239,7 @@ void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattic
     TESSERA_CHECK(lattice.isAxisParallel(), "nodes of turned lattices are placed by the processor");
     grow(context, frame_, mesh.nodeCount_ * 6 * sizeof(double));
     grow(context, rough_, mesh.nodeCount_ * 4 * sizeof(float));
-    const Use placing = use(context, Stage::frame);
+    const ComputeUse placing = use(context, Stage::frame);
     placing.bind(0, mesh.nodes_);
     placing.bind(1, frame_);
     placing.bind(2, rough_);
@@ -254,7 +249,7 @@ void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattic
     placing.run(mesh.nodeCount_);
 }
 
-void RecordMaker::usePlaced(Use& used, const DeviceMesh& mesh) const {
+void RecordMaker::usePlaced(ComputeUse& used, const DeviceMesh& mesh) const {
     used.bind(0, mesh.tets_);
     used.bind(1, frame_);
     used.set("regionMin", points_.min);
@@ -273,7 +268,7 @@ std::size_t RecordMaker::addUp(GlContext& context, const GlBuffer& items, std::s
         levels.push_back(
             {levels.back().first + levels.back().count, (levels.back().count + kFan - 1) / kFan});
     grow(context, sums, (levels.back().first + 1) * sizeof(GLuint));
-    const Use adding = use(context, Stage::sums);
+    const ComputeUse adding = use(context, Stage::sums);
     adding.bind(0, items);
     adding.bind(1, sums);
     adding.flag("areBits", areBits);
@@ -291,6 +286,16 @@ std::size_t RecordMaker::addUp(GlContext& context, const GlBuffer& items, std::s
     return levels.back().first;
 }
 
+void RecordMaker::list(GlContext& context, const GlBuffer& marks, const GlBuffer& sums, std::size_t words,
+                       const GlBuffer& listed) {
+    const ComputeUse listing = use(context, Stage::list);
+    listing.bind(0, marks);
+    listing.bind(1, sums);
+    listing.bind(2, listed);
+    listing.set("wordCount", words);
+    listing.run(words);
+}
+
 std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, const IndexBox& points) {
     points_ = points;
     const std::size_t words = (mesh.elementCount_ + 31) / 32;
@@ -298,7 +303,7 @@ std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, c
     if (words == 0) return 0;
     grow(context, marks_, words * sizeof(GLuint));
     clear(context, marks_, words * sizeof(GLuint));
-    const Use near = use(context, Stage::near);
+    const ComputeUse near = use(context, Stage::near);
     near.bind(0, mesh.tets_);
     near.bind(1, rough_);
     near.bind(2, marks_);
@@ -325,42 +330,59 @@ std::int64_t RecordMaker::bytesFor(std::int64_t listed, std::int64_t thin, int c
 }
 
 std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh,
-                                                           std::int64_t most) {
-    easyCount_ = thinCount_ = 0;
+                                                           std::int64_t most, std::optional<int> layerAxis) {
+    thinCount_ = 0;
     if (listedCount_ == 0) return Made{};
     const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
     grow(context, listed_, listedCount_ * sizeof(GLuint));
-    const Use list = use(context, Stage::list);
-    list.bind(0, marks_);
-    list.bind(1, markSums_);
-    list.bind(2, listed_);
-    list.set("wordCount", markWords);
-    list.run(markWords);
+    list(context, marks_, markSums_, markWords, listed_);
 
+    // One more bucket than there are: before the last stand all.
+    const std::size_t counters = layerAxis ? kKinds * kLayers : 2 * kBuckets + 1;
     grow(context, easyGeometry_, listedCount_ * sizeof(EasyGeometry));
     grow(context, boxes_, listedCount_ * sizeof(ScanBox));
-    grow(context, sorted_, listedCount_ * sizeof(ScanBox));
     grow(context, thinMarks_, thinWords * sizeof(GLuint));
-    grow(context, bucketCounts_, (2 * kBuckets + 1) * sizeof(GLuint));
+    grow(context, boxCounts_, counters * sizeof(GLuint));
     grow(context, hard_, (listedCount_ + 1) * sizeof(GLuint));
-    grow(context, counts_, (kRunCounts + 2) * sizeof(GLuint));
     clear(context, thinMarks_, thinWords * sizeof(GLuint));
-    clear(context, bucketCounts_, (2 * kBuckets + 1) * sizeof(GLuint));
+    clear(context, boxCounts_, counters * sizeof(GLuint));
     clear(context, hard_, sizeof(GLuint));
-    Use easy = use(context, Stage::easyGeometry);
+    ComputeUse easy = use(context, layerAxis ? Stage::drawnGeometry : Stage::easyGeometry);
     usePlaced(easy, mesh);
     easy.bind(2, listed_);
     easy.bind(3, easyGeometry_);
     easy.bind(4, boxes_);
     easy.bind(5, thinMarks_);
-    easy.bind(6, bucketCounts_);
+    easy.bind(6, boxCounts_);
     easy.bind(7, hard_);
+    easy.set("layerAxis", std::size_t(layerAxis.value_or(2)));
     easy.run(listedCount_);
 
     const std::size_t thinTotal = addUp(context, thinMarks_, thinWords, true, thinSums_);
-    // One more than there are: before the last stand all.
-    addUp(context, bucketCounts_, 2 * kBuckets + 1, false, bucketSums_);
-    const Use count = use(context, Stage::counts);
+    Made made;
+    const std::size_t hardCount = layerAxis ? countLayers(context, thinTotal, made.layers)
+                                            : countBuckets(context, thinTotal, made.runs);
+    const int channels = mesh.passes_.front().channels;  // no pass has more
+    if (bytesFor(std::int64_t(listedCount_), std::int64_t(thinCount_), channels) > most) return std::nullopt;
+    if (hardCount > 0) made.hard = read<std::int32_t>(context, hard_, 1, hardCount);
+    std::ranges::sort(made.hard);
+    makeThinGeometry(context, mesh);
+    if (layerAxis) return made;
+
+    grow(context, sorted_, listedCount_ * sizeof(ScanBox));
+    const ComputeUse sort = use(context, Stage::sort);
+    sort.bind(0, boxes_);
+    sort.bind(1, bucketSums_);
+    sort.bind(2, sorted_);
+    sort.set("listedCount", listedCount_);
+    sort.run(listedCount_);
+    return made;
+}
+
+std::size_t RecordMaker::countBuckets(GlContext& context, std::size_t thinTotal, std::vector<ScanRun>& runs) {
+    addUp(context, boxCounts_, 2 * kBuckets + 1, false, bucketSums_);
+    grow(context, counts_, (kRunCounts + 2) * sizeof(GLuint));
+    const ComputeUse count = use(context, Stage::counts);
     count.bind(0, thinSums_);
     count.bind(1, hard_);
     count.bind(2, bucketSums_);
@@ -369,35 +391,35 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
     count.run(kRunCounts);
     const auto counts = read<GLuint>(context, counts_, 0, kRunCounts + 2);
     thinCount_ = counts[0];
-    const int channels = mesh.passes_.front().channels;  // no pass has more
-    if (bytesFor(std::int64_t(listedCount_), std::int64_t(thinCount_), channels) > most) return std::nullopt;
-    Made made{listScanRuns(std::span(counts).subspan<2, kRunCounts>()), {}};
-    if (counts[1] > 0) made.hard = read<std::int32_t>(context, hard_, 1, counts[1]);
-    std::ranges::sort(made.hard);
+    runs = listScanRuns(std::span(counts).subspan<2, kRunCounts>());
+    return counts[1];
+}
 
-    const Use sort = use(context, Stage::sort);
-    sort.bind(0, boxes_);
-    sort.bind(1, bucketSums_);
-    sort.bind(2, sorted_);
-    sort.set("listedCount", listedCount_);
-    sort.run(listedCount_);
+std::size_t RecordMaker::countLayers(GlContext& context, std::size_t thinTotal, LayerCounts& layers) {
+    const auto steps = read<GLuint>(context, boxCounts_, 0, kKinds * kLayers);
+    layers.resize(kLayers);
+    for (std::size_t kind = 0; kind < kKinds; ++kind) {
+        GLuint count = 0;
+        for (std::size_t layer = 0; layer < kLayers; ++layer)
+            layers[layer][kind] = count += steps[kind * kLayers + layer];
+    }
+    thinCount_ = read<GLuint>(context, thinSums_, thinTotal, 1).front();
+    return read<GLuint>(context, hard_, 0, 1).front();
+}
 
-    easyCount_ = counts[2 + kPartSizes + 1];
+void RecordMaker::makeThinGeometry(GlContext& context, const DeviceMesh& mesh) {
     grow(context, thinGeometry_, std::max<std::size_t>(1, thinCount_) * sizeof(ThinGeometry));
     grow(context, thinSlots_, std::max<std::size_t>(1, thinCount_) * sizeof(GLuint));
-    if (thinCount_ == 0) return made;
-    Use thin = use(context, Stage::thinGeometry);
+    if (thinCount_ == 0) return;
+    ComputeUse thin = use(context, Stage::thinGeometry);
     usePlaced(thin, mesh);
     thin.bind(2, listed_);
     thin.bind(3, thinGeometry_);
-    thin.bind(4, sorted_);
+    thin.bind(4, boxes_);
     thin.bind(5, thinMarks_);
     thin.bind(6, thinSums_);
     thin.bind(7, thinSlots_);
-    thin.set("firstBox", easyCount_);
-    thin.set("boxCount", thinCount_);
-    thin.run(thinCount_);
-    return made;
+    thin.run(listedCount_);
 }
 
 void RecordMaker::makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass,
@@ -407,10 +429,10 @@ void RecordMaker::makeChannels(GlContext& context, const DeviceMesh& mesh, std::
     const std::size_t anElement = std::size_t(codes.channels) * sizeof(ChannelRecord);
     grow(context, easyChannels_, listedCount_ * anElement);
     grow(context, thinChannels_, std::max<std::size_t>(1, thinCount_) * anElement);
-    Use channels = use(context, Stage::channels, codes.channels);
+    ComputeUse channels = use(context, Stage::channels, codes.channels);
     usePlaced(channels, mesh);
     channels.bind(2, listed_);
-    channels.bind(3, sorted_);
+    channels.bind(3, boxes_);
     channels.bind(4, codes.nodeCodes);
     channels.bind(5, codes.cellCodes);
     channels.bind(7, thinSlots_);
@@ -418,7 +440,7 @@ void RecordMaker::makeChannels(GlContext& context, const DeviceMesh& mesh, std::
     context.functions().ProgramUniform1f(channels.program.id(), channels.at("invalid"),
                                          sampleMarks(format).invalid);
     for (const bool areThin : {false, true}) {
-        const std::size_t count = areThin ? thinCount_ : easyCount_;
+        const std::size_t count = areThin ? thinCount_ : listedCount_;
         if (count == 0) continue;
         channels.bind(6, areThin ? thinChannels_ : easyChannels_);
         channels.set("elementCount", count);
@@ -433,6 +455,10 @@ ScanRecords RecordMaker::records() const {
 
 std::vector<std::int32_t> RecordMaker::listed(GlContext& context) const {
     return read<std::int32_t>(context, listed_, 0, listedCount_);
+}
+
+std::vector<ScanBox> RecordMaker::boxes(GlContext& context) const {
+    return read<ScanBox>(context, boxes_, 0, listedCount_);
 }
 
 }  // namespace tessera

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "gl/gl_program.h"
+#include "raster/dispatch.h"
 #include "raster/point_scan.h"
 #include "raster/prepared_region.h"
 
@@ -31,12 +33,15 @@ class DeviceMesh {
         const TetMesh& whole;
         UninitializedVector<std::array<std::uint32_t, 4>> tets;
         std::vector<Pass> passes;
+        Vec3d sizesWorld{0};  ///< of all elements together
     };
     DeviceMesh(GlContext& context, const Source& source);
 
     /// On the device, with what it takes to place the nodes in a lattice; not what regions take.
     static std::int64_t bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels);
     std::int64_t uploadedBytes() const;
+    /// The axis of a lattice along which elements reach the fewest layers.
+    int layerAxis(const Vec3d& spacingWorld) const;
 
   private:
     friend class RecordMaker;
@@ -46,9 +51,14 @@ class DeviceMesh {
         int channels;
     };
     std::size_t nodeCount_, elementCount_;
+    Vec3d sizesWorld_;
     GlBuffer nodes_, tets_;
     std::vector<Pass> passes_;
 };
+
+/// How many elements of each kind, as ranks have it, reach each layer of a region.
+inline constexpr std::size_t kKinds = 4;
+using LayerCounts = std::vector<std::array<std::uint32_t, kKinds>>;
 
 /// What a scan goes through, in buffers of the device.
 struct ScanRecords {
@@ -56,9 +66,12 @@ struct ScanRecords {
     std::vector<ScanRun> runs;
 };
 
+/// What the shaders that go by records know of the host's constants, but channels.
+std::vector<ShaderDefine> recordDefines();
+
 /// Makes the records and boxes of a region by compute shaders, from a mesh that is on the device: those that
-/// prepareRegion() and listScanBoxes() make, bit for bit, but that boxes aren't tightened and records of easy
-/// elements stand in gaps. All functions run on the device's OpenGL thread.
+/// prepareRegion() and listScanBoxes() make, bit for bit, but that boxes of a scan aren't tightened and
+/// records of easy elements stand in gaps. All functions run on the device's OpenGL thread.
 class RecordMaker {
   public:
     /// Whether operations on doubles give the bits of the processor's, as the records need it.
@@ -72,12 +85,14 @@ class RecordMaker {
     std::int64_t findNear(GlContext& context, const DeviceMesh& mesh, const IndexBox& points);
 
     struct Made {
-        std::vector<ScanRun> runs;
+        std::vector<ScanRun> runs;       ///< of a scan
+        LayerCounts layers;              ///< of what is drawn
         std::vector<std::int32_t> hard;  ///< elements, ascending
     };
-    /// The records of those elements but their channels. Null when thin ones make it more bytes, with the
-    /// channels, than `most`.
-    std::optional<Made> makeGeometry(GlContext& context, const DeviceMesh& mesh, std::int64_t most);
+    /// The records of those elements but their channels, to be scanned or, with a layer axis, drawn. Null
+    /// when thin ones make it more bytes, with the channels, than `most`.
+    std::optional<Made> makeGeometry(GlContext& context, const DeviceMesh& mesh, std::int64_t most,
+                                     std::optional<int> layerAxis = {});
     /// What records take when `listed` elements are listed.
     static std::int64_t bytesFor(std::int64_t listed, std::int64_t thin, int channels);
     void makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass, SampleFormat format);
@@ -85,25 +100,46 @@ class RecordMaker {
     ScanRecords records() const;
     /// The elements that it lists, ascending; for tests.
     std::vector<std::int32_t> listed(GlContext& context) const;
+    /// Theirs; those without one have the rank ~0.
+    std::vector<ScanBox> boxes(GlContext& context) const;
 
   private:
-    enum class Stage { frame, near, sums, list, easyGeometry, thinGeometry, channels, sort, counts, doubles };
-    struct Use;
+    friend class PrimitiveMaker;
+    enum class Stage {
+        frame,
+        near,
+        sums,
+        list,
+        easyGeometry,
+        drawnGeometry,
+        thinGeometry,
+        channels,
+        sort,
+        counts,
+        doubles
+    };
     const GlProgram& program(GlContext& context, Stage stage, int channels = 0);
-    Use use(GlContext& context, Stage stage, int channels = 0);
-    void usePlaced(Use& used, const DeviceMesh& mesh) const;
+    ComputeUse use(GlContext& context, Stage stage, int channels = 0);
+    void usePlaced(ComputeUse& used, const DeviceMesh& mesh) const;
     /// Makes sums of all items before each; the sum of all stands behind them, at the place that is returned.
     std::size_t addUp(GlContext& context, const GlBuffer& items, std::size_t count, bool areBits,
                       GlBuffer& sums);
+    /// Lists what is marked, ascending.
+    void list(GlContext& context, const GlBuffer& marks, const GlBuffer& sums, std::size_t words,
+              const GlBuffer& listed);
+    /// Both give the number of hard elements, and note that of thin ones.
+    std::size_t countBuckets(GlContext& context, std::size_t thinTotal, std::vector<ScanRun>& runs);
+    std::size_t countLayers(GlContext& context, std::size_t thinTotal, LayerCounts& layers);
+    void makeThinGeometry(GlContext& context, const DeviceMesh& mesh);
 
     std::map<std::pair<Stage, int>, GlProgram> programs_;
     std::optional<bool> isExact_;
     GlBuffer frame_, rough_;
     GlBuffer marks_, markSums_, listed_;
     GlBuffer easyGeometry_, easyChannels_, thinGeometry_, thinChannels_;
-    GlBuffer boxes_, sorted_, thinMarks_, thinSums_, thinSlots_, bucketCounts_, bucketSums_, hard_, counts_;
+    GlBuffer boxes_, sorted_, thinMarks_, thinSums_, thinSlots_, boxCounts_, bucketSums_, hard_, counts_;
     IndexBox points_;
-    std::size_t listedCount_ = 0, easyCount_ = 0, thinCount_ = 0;
+    std::size_t listedCount_ = 0, thinCount_ = 0;
 };
 
 }  // namespace tessera

@@ -11,13 +11,6 @@ namespace {
 /// Corners that move further than this make way for a rectangle.
 constexpr double kLongestMiter = 0x1p-3;
 
-/// A fan of 3 or 4 corners.
-void addTriangles(std::size_t first, std::size_t corners, PrimitiveList& list) {
-    const auto a = std::uint32_t(first);
-    const std::uint32_t fan[6] = {a, a + 1, a + 2, a, a + 2, a + 3};
-    list.indices.insert(list.indices.end(), fan, fan + (corners - 2) * 3);
-}
-
 }  // namespace
 
 void emitRect(const PixelRect& rect, int layer, const SliceElement& element, PrimitiveList& list) {
@@ -27,12 +20,10 @@ void emitRect(const PixelRect& rect, int layer, const SliceElement& element, Pri
                                 std::uint16_t(layer), std::uint16_t(edge)});
         return;
     }
-    const std::size_t first = list.vertices.size();
     const auto s0 = float(rect.s0), t0 = float(rect.t0), s1 = float(rect.s1 + 1), t1 = float(rect.t1 + 1);
     const auto l = std::uint32_t(layer);
     for (const auto& [s, t] : {std::pair(s0, t0), std::pair(s1, t0), std::pair(s1, t1), std::pair(s0, t1)})
-        list.vertices.push_back({s, t, element.record, l});
-    addTriangles(first, 4, list);
+        list.corners.push_back({s, t, element.record, l});
 }
 
 bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, int layer, std::uint32_t record,
@@ -63,12 +54,10 @@ bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, in
         if (along * along * (2 - 2 * cosine) > kLongestMiter * kLongestMiter) return false;
         for (int a = 0; a < 2; ++a) grown[k][a] = corners[k][std::size_t(a)] + along * (in[a] - out[a]);
     }
-    const std::size_t first = list.vertices.size();
-    PolygonVertex vertices[4];
-    for (std::size_t k = 0; k < n; ++k)
-        vertices[k] = {float(grown[k][0]), float(grown[k][1]), record, std::uint32_t(layer)};
-    list.vertices.insert(list.vertices.end(), vertices, vertices + n);
-    addTriangles(first, n, list);
+    for (std::size_t k = 0; k < 4; ++k) {
+        const auto& [s, t] = grown[std::min(k, n - 1)];
+        list.corners.push_back({float(s), float(t), record, std::uint32_t(layer)});
+    }
     return true;
 }
 

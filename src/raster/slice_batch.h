@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "gl/shader_text.h"
 #include "raster/element_shape.h"
 #include "raster/published.h"
 #include "tessera/vec.h"
@@ -35,11 +36,10 @@ struct PolygonVertex {
     std::uint32_t layer;
 };
 
-/// Sprites and triangles, in the order they are drawn.
+/// Sprites and polygons, in the order they are drawn.
 struct PrimitiveList {
     std::vector<Sprite> sprites;
-    std::vector<PolygonVertex> vertices;
-    std::vector<std::uint32_t> indices;  ///< three a triangle; the first corner provokes
+    std::vector<PolygonVertex> corners;  ///< four a polygon; of a triangle the last one stands twice
 };
 
 /// Triangles of the published methods; one of the two kinds of corners.
@@ -91,6 +91,8 @@ class SliceGenerator {
   public:
     virtual ~SliceGenerator() = default;
     virtual void emit(const SlabInput& input, SliceBatch& batch) const = 0;
+    /// The same as slice_primitives.glsl asks for it.
+    virtual const ShaderText& shader() const = 0;
     /// The same as published, without growing.
     virtual void emitPublished(const SlabInput& input, SliceBatch& batch) const = 0;
 };
@@ -107,6 +109,9 @@ void emitRect(const PixelRect& rect, int layer, const SliceElement& element, Pri
 /// when a corner is too sharp or the polygon too thin for that.
 bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, int layer, std::uint32_t record,
                PrimitiveList& list);
+
+/// In voxels: corners of elements with longer edges lose too much in the rasteriser's fixed point.
+inline constexpr double kLargestPolygon = 1000;
 
 /// In pixels: more than what the rasteriser's snapping of corners can take away and an element's margin.
 inline constexpr double kGrowth = 0x1p-7;

@@ -6,6 +6,10 @@
 
 namespace tessera {
 
+std::string_view nameOf(Primitives primitives) {
+    return primitives == Primitives::device ? "device" : "processor";
+}
+
 std::string_view nameOf(SampleFormat format) {
     switch (format) {
         case SampleFormat::r32f:

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "slicing/shaders.h"
+
 namespace tessera {
 
 namespace {
-
-/// Beyond this, corners lose too much in the rasteriser's fixed point.
-constexpr float kLargestExtent = 1000;
 
 /// Corners of a silhouette for each set of front faces (bit j: the face opposite node j), in order around it.
 /// One front face or one back face: that face. Two and two: the front faces share the edge between the nodes
@@ -55,15 +54,15 @@ Ready makeReady(const SlabInput& input, const SliceElement& e) {
     ready.layerBegin = std::max(input.layerBegin, int(e.low[axes.l]));
     ready.layerEnd = std::min(input.layerEnd, int(e.high[axes.l]) + 1);
     ready.rect = {e.low[axes.s], e.low[axes.t], e.high[axes.s], e.high[axes.t]};
-    float extent = 0;
+    double extent = 0;
     for (const int axis : {axes.s, axes.t}) {
         const auto [low, high] =
             std::minmax({e.node[0][axis], e.node[1][axis], e.node[2][axis], e.node[3][axis]});
-        extent = std::max(extent, high - low);
+        extent = std::max(extent, double(high) - double(low));
     }
     const Silhouette& silhouette = silhouetteOf(e, axes);
     ready.triangles = std::max(1, silhouette.corners - 2);
-    if (e.isSmall || extent > kLargestExtent) return ready;
+    if (e.isSmall || extent > kLargestPolygon) return ready;
     ready.corners = silhouette.corners;
     for (int k = 0; k < silhouette.corners; ++k) {
         const float* node = e.node[silhouette.node[k]];
@@ -111,6 +110,10 @@ void SilhouetteGenerator::emitPublished(const SlabInput& input, SliceBatch& batc
             for (std::uint32_t k = 2; k < std::uint32_t(silhouette.corners); ++k)
                 list.indices.insert(list.indices.end(), {first, first + k - 1, first + k});
         }
+}
+
+const ShaderText& SilhouetteGenerator::shader() const {
+    return shaders::slicing::kSilhouettes;
 }
 
 }  // namespace tessera

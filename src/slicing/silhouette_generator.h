@@ -12,6 +12,7 @@ namespace tessera {
 class SilhouetteGenerator : public SliceGenerator {
   public:
     void emit(const SlabInput& input, SliceBatch& batch) const override;
+    const ShaderText& shader() const override;
     /// Strips of one or two triangles whose corners carry barycentric coordinates.
     void emitPublished(const SlabInput& input, SliceBatch& batch) const override;
 };

@@ -749,8 +749,8 @@ VdbWriteResult writeVdb(const std::string& path, const std::vector<OutputField>&
         written.activeVoxels +=
             std::int64_t(grid->metaValue<openvdb::Int64>(openvdb::GridBase::META_FILE_VOXEL_COUNT));
     written.fileBytes = file.size();
-    file.commit(execution);
     freeTiles(result.store, execution);
+    file.commit(execution);  // the last step: nothing after it may be cancelled
     return written;
 }
 

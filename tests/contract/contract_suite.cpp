@@ -294,9 +294,11 @@ std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& 
     const Block whole = sample(subject, mesh, fields, at.lattice, at.box);
     std::vector<std::string> changed;
     const auto compare = [&](const TetMesh& of, std::span<const IndexBox> boxes, int threads,
-                             const std::string& target, const std::string& what, Route route) {
+                             const std::string& target, const std::string& what, Route route,
+                             Primitives primitives = Primitives::device) {
         BindOptions bind = subject.bindOptions();
         bind.route = route;
+        bind.primitives = primitives;
         if (!target.empty()) bind.target = target;
         std::int64_t count = 0;
         for (const Block& part : sample(resampler, of, fields, at.lattice, boxes, {bind, threads}))
@@ -306,7 +308,8 @@ std::vector<std::string> findChangedBits(const Subject& subject, const TetMesh& 
     compare(mesh, one, 1, {}, "another run, by the index", Route::index);
     const bool isThorough = !subject.isOnDevice() || (subject.isPrimary && !kIsSanitized && !isHurried());
     for (const int threads : isThorough ? std::vector{2, 5, 16} : std::vector{3})
-        compare(mesh, one, threads, {}, std::to_string(threads) + " threads", Route::pass);
+        compare(mesh, one, threads, {}, std::to_string(threads) + " threads, primitives by the processor",
+                Route::pass, Primitives::processor);
     for (const int edge : isThorough ? std::vector{8, 16, 32, 64} : std::vector{16})
         compare(mesh, cut(at.box, edge), 3, {}, "boxes of " + std::to_string(edge),
                 edge == 16 ? Route::index : Route::pass);

@@ -34,7 +34,7 @@ struct Subject {
     std::string name;         ///< "Software", "SlicingOsmesa", "SlicingR8": part of a test's name
     Route route = Route::pass;
 
-    BindOptions bindOptions() const { return {target, format, route, {}}; }
+    BindOptions bindOptions() const { return {target, format, route}; }
     ContractBounds bounds() const;
     /// Empty when it can run here.
     std::string unavailableReason() const;

@@ -7,10 +7,15 @@
 
 #include <array>
 #include <map>
+#include <memory>
+#include <optional>
 #include <tuple>
 
+#include "gl/gl_platform.h"
+#include "gl/gl_thread.h"
 #include "hybrid/slice_polygon_generator.h"
 #include "raster/prepared_region.h"
+#include "raster/primitive_maker.h"
 #include "raster/regions.h"
 #include "raster_elements.h"
 #include "reference/reference_block.h"
@@ -28,34 +33,26 @@ constexpr double kSnapping = 0x1p-8;
 constexpr int kLayersASlab = 8;
 
 /// All that a generator emits for an element in one layer.
-struct Primitives {
+struct Emitted {
     std::vector<Sprite> sprites;
     std::vector<std::vector<std::array<double, 2>>> polygons;
 };
 
 using ElementLayer = std::tuple<ShapeGrade, std::uint32_t, std::uint32_t>;  // grade, record, layer
 
-void sortPrimitives(const PrimitiveList& list, ShapeGrade grade, std::map<ElementLayer, Primitives>& sorted) {
+void sortPrimitives(const PrimitiveList& list, ShapeGrade grade, std::map<ElementLayer, Emitted>& sorted) {
     for (const Sprite& sprite : list.sprites)
         sorted[{grade, sprite.record, sprite.layer}].sprites.push_back(sprite);
-    ASSERT_EQ(list.indices.size() % 3, 0u);
-    // Triangles of a fan share their first corner, which provokes; together they are a convex polygon.
-    for (std::size_t i = 0; i < list.indices.size();) {
-        const std::uint32_t first = list.indices[i];
-        const PolygonVertex& provoking = list.vertices[first];
+    ASSERT_EQ(list.corners.size() % 4, 0u);
+    for (std::size_t i = 0; i < list.corners.size(); i += 4) {
+        const PolygonVertex& provoking = list.corners[i];
         std::vector<std::array<double, 2>> polygon;
-        const auto add = [&](std::uint32_t at) {
-            const PolygonVertex& v = list.vertices[at];
+        for (std::size_t k = i; k < i + 4; ++k) {
+            const PolygonVertex& v = list.corners[k];
             ASSERT_EQ(std::tie(v.record, v.layer), std::tie(provoking.record, provoking.layer));
-            polygon.push_back({double(v.s), double(v.t)});
-        };
-        add(first);
-        add(list.indices[i + 1]);
-        std::uint32_t last = list.indices[i + 1];
-        for (; i < list.indices.size() && list.indices[i] == first; i += 3) {
-            ASSERT_EQ(list.indices[i + 1], last) << "a fan goes on where it was";
-            last = list.indices[i + 2];
-            add(last);
+            const std::array<double, 2> corner{double(v.s), double(v.t)};
+            if (k == i + 3 && corner == polygon.back()) continue;  // of a triangle it stands twice
+            polygon.push_back(corner);
         }
         sorted[{grade, provoking.record, provoking.layer}].polygons.push_back(std::move(polygon));
     }
@@ -78,7 +75,7 @@ double depthIn(const std::vector<std::array<double, 2>>& polygon, double s, doub
     return least;
 }
 
-bool holds(const Primitives& primitives, int s, int t) {
+bool holds(const Emitted& primitives, int s, int t) {
     for (const Sprite& sprite : primitives.sprites)
         if (s >= sprite.s && t >= sprite.t && s < sprite.s + sprite.edge && t < sprite.t + sprite.edge)
             return true;
@@ -87,11 +84,11 @@ bool holds(const Primitives& primitives, int s, int t) {
     return false;
 }
 
-std::map<ElementLayer, Primitives> generate(const SliceGenerator& generator, const PreparedRegion& region,
-                                            const SliceAxes& axes) {
+std::map<ElementLayer, Emitted> generate(const SliceGenerator& generator, const PreparedRegion& region,
+                                         const SliceAxes& axes) {
     const ActiveElements active = listActiveElements(region, axes, kLayersASlab);
     const Vec3i size = region.points.size();
-    std::map<ElementLayer, Primitives> sorted;
+    std::map<ElementLayer, Emitted> sorted;
     for (std::size_t slab = 0; slab < active.slabCount(); ++slab) {
         const int first = int(slab) * kLayersASlab, last = std::min(first + kLayersASlab, size[axes.l]);
         SliceBatch batch;
@@ -103,7 +100,7 @@ std::map<ElementLayer, Primitives> generate(const SliceGenerator& generator, con
         input.elements = region.elements;
         input.active = active.of(slab);
         generator.emit(input, batch);
-        std::map<ElementLayer, Primitives> ofSlab;
+        std::map<ElementLayer, Emitted> ofSlab;
         sortPrimitives(batch.easy, ShapeGrade::easy, ofSlab);
         sortPrimitives(batch.thin, ShapeGrade::thin, ofSlab);
         for (auto& [key, primitives] : ofSlab) {
@@ -116,13 +113,90 @@ std::map<ElementLayer, Primitives> generate(const SliceGenerator& generator, con
     return sorted;
 }
 
+/// What the device makes of a whole mesh for the same; elements stand in place of records. None without
+/// OpenGL.
+class DeviceGenerator {
+  public:
+    DeviceGenerator() {
+        const std::vector<GlPlatform> platforms = availableGlPlatforms();
+        if (platforms.empty()) return;
+        thread_ = &sharedGlThread(platforms.front());
+        makers_ = std::shared_ptr<Makers>(new Makers, [thread = thread_](Makers* makers) {
+            thread->run([makers](GlContext&) { delete makers; });
+        });
+    }
+    bool isThere() const { return makers_ != nullptr; }
+
+    void take(const TetMesh& mesh, const Lattice& lattice) {
+        const DeviceMesh::Source source(mesh, {}, SampleFormat::r32f, {});
+        thread_->run([&](GlContext& context) {
+            makers_->mesh.emplace(context, source);
+            makers_->records.place(context, *makers_->mesh, lattice);
+        });
+    }
+
+    std::map<ElementLayer, Emitted> generate(const SliceGenerator& generator, const IndexBox& box,
+                                             const SliceAxes& axes) {
+        return thread_->run([&](GlContext& context) { return generate(context, generator, box, axes); });
+    }
+
+  private:
+    struct Makers {
+        RecordMaker records;
+        PrimitiveMaker primitives;
+        std::optional<DeviceMesh> mesh;
+    };
+
+    std::map<ElementLayer, Emitted> generate(GlContext& context, const SliceGenerator& generator,
+                                             const IndexBox& box, const SliceAxes& axes) {
+        RecordMaker& records = makers_->records;
+        records.findNear(context, *makers_->mesh, box);
+        const RecordMaker::Made made =
+            records.makeGeometry(context, *makers_->mesh, std::int64_t(1) << 40, axes.l).value();
+        const std::vector<std::int32_t> listed = records.listed(context);
+        std::map<std::uint32_t, std::int32_t> elementOf;  // rank
+        const std::vector<ScanBox> boxes = records.boxes(context);
+        for (std::size_t slot = 0; slot < boxes.size(); ++slot) elementOf[boxes[slot].rank] = listed[slot];
+        std::map<ElementLayer, Emitted> sorted;
+        for (const PrimitiveMaker::Slab& slab : PrimitiveMaker::slabs(made.layers, 1 << 14))
+            for (std::uint32_t kind = 0; kind < kKinds; ++kind) {
+                if (slab.counts[kind] == 0) continue;
+                const auto primitives = makers_->primitives.make(context, records, *makers_->mesh, axes,
+                                                                 generator.shader(), slab, kind);
+                PrimitiveList list;
+                const auto read = [&](auto& items, std::size_t count) {
+                    items.resize(count);
+                    context.functions().GetNamedBufferSubData(
+                        primitives.buffer, 0, GLsizeiptr(count * sizeof(items[0])), items.data());
+                    std::uint32_t last = 0;
+                    for (auto& item : items) {
+                        EXPECT_GE(item.record, last) << "by ascending records";
+                        last = item.record;
+                        item.record = std::uint32_t(elementOf.at(kind << kRankKindShift | item.record));
+                    }
+                };
+                if (isLargeKind(kind))
+                    read(list.corners, 4 * primitives.count);
+                else
+                    read(list.sprites, primitives.count);
+                sortPrimitives(list, isThinKind(kind) ? ShapeGrade::thin : ShapeGrade::easy, sorted);
+            }
+        for (const auto& [key, primitives] : sorted)
+            EXPECT_EQ(primitives.sprites.size() + primitives.polygons.size(), 1u) << "one primitive a slice";
+        return sorted;
+    }
+
+    GlThread* thread_ = nullptr;
+    std::shared_ptr<Makers> makers_;
+};
+
 struct Tally {
     std::int64_t held = 0, lost = 0, beside = 0;
     std::int64_t easy = 0, thin = 0, hard = 0, sprites = 0, polygons = 0;
 };
 
 /// What the shaders need to run safely.
-void expectWithinTarget(const std::map<ElementLayer, Primitives>& sorted, const Vec3i& size,
+void expectWithinTarget(const std::map<ElementLayer, Emitted>& sorted, const Vec3i& size,
                         const SliceAxes& axes, Tally& tally) {
     for (const auto& [key, primitives] : sorted) {
         for (const Sprite& sprite : primitives.sprites) {
@@ -146,8 +220,12 @@ std::string describe(const TetMesh& mesh, std::int32_t element, const Vec3i& p, 
     return text;
 }
 
-/// Checks every point that an element covers in the region, for both generators and the three axes.
+/// Checks every point that an element covers in the region, for both generators, by processor and device, and
+/// the three axes.
 void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box, Tally& tally) {
+    static DeviceGenerator& device = *new DeviceGenerator;  // lives as long as its thread
+    const bool isOnDevice = device.isThere() && lattice.isAxisParallel();
+    if (isOnDevice) device.take(mesh, lattice);
     const NodeFrame frame = frameNodes(mesh, lattice, {});
     const Oracle oracle(mesh, lattice);
     const ReferenceBlock reference = referenceBlock(oracle, box, {.toleranceVoxels = kLargestMargin});
@@ -162,31 +240,39 @@ void checkMesh(const TetMesh& mesh, const Lattice& lattice, const IndexBox& box,
         const SlicePolygonGenerator polygons;
         for (const SliceGenerator* generator : {static_cast<const SliceGenerator*>(&silhouettes),
                                                 static_cast<const SliceGenerator*>(&polygons)}) {
-            const auto sorted = generate(*generator, region, axes);
-            expectWithinTarget(sorted, box.size(), axes, tally);
-            Vec3i p;
-            std::size_t offset = 0;
-            for (p.z = box.min.z; p.z < box.max.z; ++p.z)
-                for (p.y = box.min.y; p.y < box.max.y; ++p.y)
-                    for (p.x = box.min.x; p.x < box.max.x; ++p.x, ++offset)
-                        for (const Candidate& candidate : reference.candidatesOf(offset)) {
-                            if (numbered.isHard(candidate.element)) continue;
-                            const SliceElement* e = numbered.find(candidate.element);
-                            const Vec3i at = p - box.min;
-                            const bool isAccepted = e && rastertest::fragmentOf(region, *e, at).isAccepted();
-                            if (!candidate.contains && !isAccepted) continue;
-                            tally.beside += !candidate.contains;
-                            const auto found =
-                                e ? sorted.find({e->grade, e->record, std::uint32_t(at[axes.l])})
-                                  : sorted.end();
-                            if (found != sorted.end() && holds(found->second, at[axes.s], at[axes.t])) {
-                                ++tally.held;
-                                continue;
+            for (const bool byDevice : {false, true}) {
+                if (byDevice && !isOnDevice) continue;
+                const auto sorted =
+                    byDevice ? device.generate(*generator, box, axes) : generate(*generator, region, axes);
+                expectWithinTarget(sorted, box.size(), axes, tally);
+                Vec3i p;
+                std::size_t offset = 0;
+                for (p.z = box.min.z; p.z < box.max.z; ++p.z)
+                    for (p.y = box.min.y; p.y < box.max.y; ++p.y)
+                        for (p.x = box.min.x; p.x < box.max.x; ++p.x, ++offset)
+                            for (const Candidate& candidate : reference.candidatesOf(offset)) {
+                                if (numbered.isHard(candidate.element)) continue;
+                                const SliceElement* e = numbered.find(candidate.element);
+                                const Vec3i at = p - box.min;
+                                const bool isAccepted =
+                                    e && rastertest::fragmentOf(region, *e, at).isAccepted();
+                                if (!candidate.contains && !isAccepted) continue;
+                                tally.beside += !candidate.contains;
+                                const auto found =
+                                    e ? sorted.find({e->grade,
+                                                     byDevice ? std::uint32_t(candidate.element) : e->record,
+                                                     std::uint32_t(at[axes.l])})
+                                      : sorted.end();
+                                if (found != sorted.end() && holds(found->second, at[axes.s], at[axes.t])) {
+                                    ++tally.held;
+                                    continue;
+                                }
+                                if (++tally.lost <= 3)
+                                    ADD_FAILURE() << (generator == &polygons ? "hybrid" : "slicing")
+                                                  << (byDevice ? " on the device" : "") << " loses "
+                                                  << describe(mesh, candidate.element, p, axes);
                             }
-                            if (++tally.lost <= 3)
-                                ADD_FAILURE() << (generator == &polygons ? "hybrid" : "slicing") << " loses "
-                                              << describe(mesh, candidate.element, p, axes);
-                        }
+            }
         }
     }
 }

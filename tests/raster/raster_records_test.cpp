@@ -140,15 +140,21 @@ TEST_P(RasterRecords, OfTheDeviceGiveTheBitsOfDrawings) {
             BindOptions options;
             options.target = std::string(nameOf(GetParam()));
             options.format = format;
+            options.primitives = Primitives::processor;
             const auto drawn =
                 rastertest::sampleOnce("slicing", mesh, fields, options, lattice, std::span(&box, 1));
-            const auto scanned =
-                rastertest::sampleOnce("compute", mesh, fields, options, lattice, std::span(&box, 1));
-            EXPECT_EQ(rastertest::differences(scanned.blocks, drawn.blocks), 0);
-            options.route = Route::index;
-            const auto gathered =
-                rastertest::sampleOnce("compute", mesh, fields, options, lattice, std::span(&box, 1));
-            EXPECT_EQ(rastertest::differences(gathered.blocks, drawn.blocks), 0) << "by the index";
+            for (const char* algorithm : {"compute", "slicing", "hybrid"}) {
+                options.primitives = Primitives::device;
+                options.route = Route::pass;
+                const auto made =
+                    rastertest::sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+                EXPECT_EQ(rastertest::differences(made.blocks, drawn.blocks), 0) << algorithm;
+                options.route = Route::index;
+                const auto gathered =
+                    rastertest::sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+                EXPECT_EQ(rastertest::differences(gathered.blocks, drawn.blocks), 0)
+                    << algorithm << ", by the index";
+            }
         }
 }
 

@@ -192,7 +192,27 @@ RasterImage render(RasterDevice& device, const RasterInputs& inputs, const Index
     });
 }
 
-TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
+/// The same by primitives that the device makes, at most so many bytes at a time.
+RasterImage renderOnDevice(RasterDevice& device, const RasterInputs& inputs, const Lattice& lattice,
+                           const IndexBox& points, const SliceGenerator& generator, std::int64_t mostBytes) {
+    const DeviceMesh::Source source(inputs.mesh, inputs.channels, inputs.format, {});
+    return device.thread().run([&](GlContext& context) {
+        const DeviceMesh mesh(context, source);
+        device.records().place(context, mesh, lattice);
+        device.records().findNear(context, mesh, points);
+        const RecordMaker::Made made =
+            device.records().makeGeometry(context, mesh, std::int64_t(1) << 40, inputs.axes.l).value();
+        PreparedRegion region;
+        region.points = points;
+        region.hard = made.hard;
+        device.begin(context, points, inputs, 0, mesh, false);
+        device.draw(context, mesh, generator.shader(), made.layers, mostBytes);
+        device.draw(context, decideHardElements(inputs, region, 0, {}));
+        return filled(device, context);
+    });
+}
+
+TEST_P(RasterRuns, LayerByLayerAndByTheDeviceGiveTheSameBits) {
     TetMesh mesh = smallMesh(2);
     // Thin and hard elements too, inside and beside the others.
     TetMesh thin = thinTetsMesh(ThinKind::sliver, 1e-5, 0.7, 20, 3);
@@ -203,7 +223,8 @@ TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
     addRandomField(mesh, "vector", FieldLocation::point, 3, 0, 1, 5);
     addHoledCopy(mesh, 0, "holed", 5);
     const int points = 22;
-    const NodeFrame frame = frameNodes(mesh, Lattice::axisParallel(Vec3d(-0.1), 1.2 / points), {});
+    const Lattice lattice = Lattice::axisParallel(Vec3d(-0.1), 1.2 / points);
+    const NodeFrame frame = frameNodes(mesh, lattice, {});
     const std::shared_ptr<RasterDevice> layered = makeDevice(GetParam()), flat = makeDevice(GetParam());
     flat->forbidVertexShaderLayer();
     const SilhouetteGenerator silhouettes;
@@ -219,11 +240,19 @@ TEST_P(RasterRuns, LayerByLayerGivesTheSameBits) {
                 for (const SliceGenerator* generator : {static_cast<const SliceGenerator*>(&silhouettes),
                                                         static_cast<const SliceGenerator*>(&polygons)}) {
                     const RasterImage a = render(*layered, inputs, box, *generator);
-                    const RasterImage b = render(*flat, inputs, box, *generator);
-                    EXPECT_TRUE(std::ranges::equal(a.coverage, b.coverage));
-                    ASSERT_EQ(a.codes.size(), b.codes.size());
-                    EXPECT_EQ(std::memcmp(a.codes.data(), b.codes.data(), a.codes.size() * sizeof(float)), 0)
-                        << nameOf(format) << ", axis " << axis;
+                    const auto expectSame = [&](const RasterImage& b, const char* how) {
+                        EXPECT_TRUE(std::ranges::equal(a.coverage, b.coverage));
+                        ASSERT_EQ(a.codes.size(), b.codes.size());
+                        EXPECT_EQ(std::memcmp(a.codes.data(), b.codes.data(), a.codes.size() * sizeof(float)),
+                                  0)
+                            << nameOf(format) << ", axis " << axis << how;
+                    };
+                    expectSame(render(*flat, inputs, box, *generator), "");
+                    for (const std::int64_t most : {1, 1 << 16, 1 << 24})
+                        expectSame(renderOnDevice(*layered, inputs, lattice, box, *generator, most),
+                                   ", by the device");
+                    expectSame(renderOnDevice(*flat, inputs, lattice, box, *generator, 1 << 24),
+                               ", by the device, layer by layer");
                     EXPECT_GT(std::ranges::count_if(
                                   a.codes, [&](float c) { return c != sampleMarks(format).uncovered; }),
                               1000);

@@ -1,4 +1,4 @@
-// Records of channels, a thread an element: of easy ones by their boxes, or of thin ones; as
+// Records of channels, a thread an element: of easy ones where they stand in the list, or of thin ones; as
 // src/raster/channel_coding.cpp makes them.
 struct NodeCode {
     double code;
@@ -35,7 +35,8 @@ float asFloat(double value) {
 void main() {
     uint index = threadIndex();
     if (index >= elementCount) return;
-    uint slot = areThin ? thinSlots[index] : boxes[index].rank & kPlaceMask;
+    if (!areThin && boxes[index].rank >> (kKindShift + 1u) != 0u) return;  // none, or not easy
+    uint slot = areThin ? thinSlots[index] : index;
     uint element = listed[slot];
     uvec4 tet = tets[element];
     Placed placed = placeNodes(tet);

@@ -1,5 +1,5 @@
 // Records of the listed elements' geometry and their boxes, a thread an element: of easy elements where they stand
-// in the list, and with THIN those of thin ones, ascending, a thread a box.
+// in the list, and with THIN those of thin ones, ascending.
 layout(std430, binding = 2) readonly buffer Listed {
     uint listed[];
 };
@@ -19,11 +19,13 @@ layout(std430, binding = 6) readonly buffer ThinSums {
 layout(std430, binding = 7) writeonly buffer ThinSlots {
     uint thinSlots[];  // where thin elements stand in the list
 };
-uniform uint firstBox, boxCount;
 #else
-layout(std430, binding = 6) buffer BucketCounts {
-    uint bucketCounts[];
+// Of each bucket that a scan sorts boxes into; with DRAWN, of each kind of elements and each layer: those that begin
+// there, less those that ended before.
+layout(std430, binding = 6) buffer BoxCounts {
+    uint boxCounts[];
 };
+uniform uint layerAxis;
 layout(std430, binding = 7) buffer HardElements {
     uint hardCount;
     uint hard[];
@@ -48,13 +50,12 @@ Geometry recordOf(Placed placed, Shape shape) {
 
 #ifdef THIN
 void main() {
-    uint index = firstBox + threadIndex();
-    if (threadIndex() >= boxCount) return;
-    uint rank = boxes[index].rank, slot = rank & kPlaceMask, word = slot >> 5, bit = 1u << (slot & 31u);
+    uint slot = threadIndex(), word = slot >> 5, bit = 1u << (slot & 31u);
+    if (slot >= listedCount || (thinMarks[word] & bit) == 0u) return;
     uint to = thinSums[word] + uint(bitCount(thinMarks[word] & (bit - 1u)));
     Placed placed = placeNodes(tets[listed[slot]]);
     geometries[to] = recordOf(placed, shapeElement(placed));
-    boxes[index].rank = (rank & ~kPlaceMask) | to;
+    boxes[slot].rank = (boxes[slot].rank & ~kPlaceMask) | to;
     thinSlots[to] = slot;
 }
 #else
@@ -75,14 +76,23 @@ void main() {
         hard[atomicAdd(hardCount, 1u)] = element;
         return;
     }
+    Geometry geometry = recordOf(placed, shape);
+#ifdef DRAWN
+    if (!tightenBox(geometry, low, end)) return;
+#endif
     bool isSmall = all(lessThanEqual(placed.high - placed.low, dvec3(SMALL_EXTENT)));
     uint kind = (shape.grade == kThin ? 2u : 0u) + (isSmall ? 0u : 1u);
     Box box = Box(kind << kKindShift | slot, pack(uvec3(low)), pack(uvec3(end - 1)));
     boxes[slot] = box;
-    atomicAdd(bucketCounts[bucketOf(box)], 1u);
+#ifdef DRAWN
+    atomicAdd(boxCounts[kind * LAYERS + uint(low[layerAxis])], 1u);
+    atomicAdd(boxCounts[kind * LAYERS + uint(end[layerAxis])], ~0u);
+#else
+    atomicAdd(boxCounts[bucketOf(box)], 1u);
+#endif
     if (shape.grade == kThin)
         atomicOr(thinMarks[slot >> 5], 1u << (slot & 31u));
     else
-        geometries[slot] = recordOf(placed, shape);
+        geometries[slot] = geometry;
 }
 #endif

@@ -8,4 +8,3 @@ uint bucketOf(Box box) {
     uvec3 parts = (size + partSize(size) - 1u) / partSize(size);
     return ofGrade + SMALL_BUCKETS + uint(findMSB(parts.x * parts.y * parts.z - 1u)) * TILES + tile;
 }
-const uint kNoBox = ~0u;  // in place of a rank
