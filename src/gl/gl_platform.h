@@ -40,6 +40,9 @@ void throwIfUnavailable(GlPlatform platform);
 /// The processor emulates the device of an available platform.
 bool isSoftwareGl(GlPlatform platform);
 
+/// driverText() of an available platform's device.
+const std::string& glDriver(GlPlatform platform);
+
 /// Opens the device in this process; only the first call for a platform takes time. Why that isn't possible,
 /// which it may not be though a trial found it available; else empty.
 const std::string& openGlDevice(GlPlatform platform);

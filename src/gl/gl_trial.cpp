@@ -208,7 +208,8 @@ int serveGlTrial(std::span<const std::string> arguments) {
     return serveTrial(arguments, [](const std::string& name) {
         GlContext context(parseGlPlatform(name));
         drawTexels(context);
-        return std::string(context.info().isSoftware ? kSoftwareFound : kHardwareFound);
+        return std::string(context.info().isSoftware ? kSoftwareFound : kHardwareFound) +
+               driverText(context.info());
     });
 }
 

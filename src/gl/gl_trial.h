@@ -46,8 +46,9 @@ std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std:
 int serveTrial(std::span<const std::string> arguments,
                const std::function<std::string(const std::string&)>& use);
 
-/// What tryGl finds: a device that the processor emulates, or another.
-inline constexpr std::string_view kSoftwareFound = "software", kHardwareFound = "hardware";
+/// What tryGl finds begins with one of these: a device that the processor emulates, or another. driverText()
+/// follows.
+inline constexpr std::string_view kSoftwareFound = "software: ", kHardwareFound = "hardware: ";
 
 /// tryDrivers for platforms: makes a context, compiles shaders, draws and reads back.
 std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms);
