@@ -51,6 +51,11 @@ class Probes {
         trial_ = std::move(trial);
     }
 
+    bool isRoomy() {
+        const std::lock_guard lock(mutex_);
+        return !trial_ || trial_->isRoomy();
+    }
+
     /// Finds out what isn't known yet. Only the first call for a platform takes time.
     void probe(std::span<const GlPlatform> platforms) {
         const std::lock_guard lock(mutex_);
@@ -157,6 +162,10 @@ GlPlatform parseGlPlatform(std::string_view name) {
 
 void tryGlFirst(GlTrial trial) {
     probes().setTrial(std::move(trial));
+}
+
+bool isGlRoomy() {
+    return probes().isRoomy();
 }
 
 const std::string& unavailableReason(GlPlatform platform) {

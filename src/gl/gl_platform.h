@@ -23,6 +23,9 @@ GlPlatform parseGlPlatform(std::string_view name);
 /// From now on a platform is tried by this program before this process uses it for the first time.
 void tryGlFirst(GlTrial trial);
 
+/// There is memory for drivers that may not be needed: GlTrial::isRoomy(), or there is no trial.
+bool isGlRoomy();
+
 /// Why no OpenGL 4.5 core context can be had from this platform, in one sentence; empty when it can. Found
 /// out once a process, by the trial, or where none is set by creating one. May be called from any thread, and
 /// leaves the caller's context alone. @throws Cancelled as the trial does.

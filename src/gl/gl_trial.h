@@ -23,6 +23,9 @@ struct GlTrial {
     double seconds = 20;                 ///< that it may take until the end
     const std::atomic<bool>* cancel = nullptr;
     std::int64_t maxMemoryBytes = 0;  ///< that is aimed at; emulated ones take 60 MB each. 0: no bound
+
+    /// Memory isn't bounded to less than 1 GiB.
+    bool isRoomy() const { return maxMemoryBytes == 0 || maxMemoryBytes >= std::int64_t(1) << 30; }
 };
 
 /// What came of it.

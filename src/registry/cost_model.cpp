@@ -1,6 +1,7 @@
 #include "registry/cost_model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -10,6 +11,12 @@
 namespace tessera {
 
 namespace {
+
+/// What the coefficients of a model count.
+std::array<double, 4> countsOf(const WorkSize& work) {
+    const double elements = double(work.elements), points = double(work.points);
+    return {1, elements, points, std::cbrt(elements * elements * points)};
+}
 
 std::string secondsText(double ms) {
     if (ms < 1) return "less than 0.001 s";
@@ -23,21 +30,43 @@ std::string countText(std::int64_t count, const std::string& what) {
 
 }  // namespace
 
-bool CostModel::isSane() const {
-    constexpr double kMostMs = 1e7;
-    for (const double value : {fixedMs, elementMs, pointMs})
-        if (!(value >= 0 && value <= kMostMs)) return false;
-    return fixedMs + elementMs + pointMs > 0;
+double CostModel::ms(const WorkSize& work) const {
+    const auto counts = countsOf(work);
+    return fixedMs * counts[0] + elementMs * counts[1] + pointMs * counts[2] + sliceMs * counts[3];
 }
 
-CostModel fitCost(const TimedWork& little, const TimedWork& moreElements, const TimedWork& morePoints) {
-    const double elements = double(moreElements.work.elements - little.work.elements);
-    const double points = double(morePoints.work.points - little.work.points);
-    CostModel cost;
-    cost.elementMs = std::max(0.0, (moreElements.ms - little.ms) / elements);
-    cost.pointMs = std::max(0.0, (morePoints.ms - little.ms) / points);
-    cost.fixedMs = std::max(0.0, little.ms - cost.ms(little.work));
-    return cost;
+bool CostModel::isSane() const {
+    constexpr double kMostMs = 1e7;
+    for (const double value : {fixedMs, elementMs, pointMs, sliceMs})
+        if (!(value >= 0 && value <= kMostMs)) return false;
+    return fixedMs + elementMs + pointMs + sliceMs > 0;
+}
+
+CostModel fitCost(std::span<const TimedWork> timed) {
+    // One coefficient after the other, so that none gets negative; each in units of what it counts at most.
+    constexpr int kRounds = 20000;
+    std::array<double, 4> unit{};
+    for (const TimedWork& one : timed)
+        for (std::size_t k = 0; k < unit.size(); ++k) unit[k] = std::max(unit[k], countsOf(one.work)[k]);
+    std::vector<std::array<double, 4>> rows;
+    for (const TimedWork& one : timed) {
+        rows.push_back(countsOf(one.work));
+        for (std::size_t k = 0; k < unit.size(); ++k) rows.back()[k] /= unit[k] * one.ms;
+    }
+    std::array<double, 4> found{};
+    std::vector<double> missing(rows.size(), 1);  // of each time, as a share of it
+    for (int round = 0; round < kRounds; ++round)
+        for (std::size_t k = 0; k < found.size(); ++k) {
+            double slope = 0, squares = 0;
+            for (std::size_t i = 0; i < rows.size(); ++i) {
+                slope += rows[i][k] * missing[i];
+                squares += rows[i][k] * rows[i][k];
+            }
+            const double step = std::max(-found[k], slope / squares);
+            found[k] += step;
+            for (std::size_t i = 0; i < rows.size(); ++i) missing[i] -= step * rows[i][k];
+        }
+    return {found[0] / unit[0], found[1] / unit[1], found[2] / unit[2], found[3] / unit[3]};
 }
 
 ResamplerChoice chooseByCost(std::span<const Candidate> candidates, const WorkSize& work) {

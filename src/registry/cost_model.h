@@ -7,13 +7,12 @@
 
 namespace tessera {
 
-/// Time that an algorithm takes, linear in its work; milliseconds.
+/// Time that an algorithm takes: linear in the elements, the points, and the slices that elements meet, which
+/// are as many as elements of one size on a cube of points would meet. Milliseconds.
 struct CostModel {
-    double fixedMs = 0, elementMs = 0, pointMs = 0;
+    double fixedMs = 0, elementMs = 0, pointMs = 0, sliceMs = 0;
 
-    double ms(const WorkSize& work) const {
-        return fixedMs + elementMs * double(work.elements) + pointMs * double(work.points);
-    }
+    double ms(const WorkSize& work) const;
     /// No coefficient is negative or absurd, and not all are 0.
     bool isSane() const;
     friend bool operator==(const CostModel&, const CostModel&) = default;
@@ -24,9 +23,8 @@ struct TimedWork {
     double ms = 0;
 };
 
-/// The plane through three times: of little work, of that with more elements, and of that with more points.
-/// What would be negative is 0, and the rest is then what little work takes.
-CostModel fitCost(const TimedWork& little, const TimedWork& moreElements, const TimedWork& morePoints);
+/// The model with the least squares of relative errors, no coefficient negative. Times are above 0.
+CostModel fitCost(std::span<const TimedWork> timed);
 
 /// An algorithm among which "auto" chooses.
 struct Candidate {

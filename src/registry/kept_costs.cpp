@@ -59,7 +59,8 @@ KeptCosts readCosts(const std::string& path) {
     try {
         const auto file = parseJson<nlohmann::json>(readWholeFile(path, kMostBytes));
         for (const auto& [key, entry] : file.items()) {
-            const CostModel cost{entry.at("fixed_ms"), entry.at("element_ms"), entry.at("point_ms")};
+            const CostModel cost{entry.at("fixed_ms"), entry.at("element_ms"), entry.at("point_ms"),
+                                 entry.at("slice_ms")};
             if (cost.isSane()) kept.emplace(key, cost);
         }
     } catch (const std::exception&) {  // measured anew, then
@@ -75,8 +76,10 @@ void keepCosts(const std::string& path, const KeptCosts& added) {
         KeptCosts all = added;
         all.merge(readCosts(path));
         for (const auto& [key, cost] : all)
-            file[key] = {
-                {"fixed_ms", cost.fixedMs}, {"element_ms", cost.elementMs}, {"point_ms", cost.pointMs}};
+            file[key] = {{"fixed_ms", cost.fixedMs},
+                         {"element_ms", cost.elementMs},
+                         {"point_ms", cost.pointMs},
+                         {"slice_ms", cost.sliceMs}};
         const std::string text = file.dump(1) + "\n";
         writeFileAtomically(path, text.size() < kMostBytes ? text : "{}");
     } catch (const std::exception&) {  // the next program measures anew

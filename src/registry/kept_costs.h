@@ -10,7 +10,7 @@ namespace tessera {
 /// By costKey().
 using KeptCosts = std::map<std::string, CostModel>;
 
-/// What a measured time holds for: the program's version, the processor and its threads, the algorithm, its
+/// What a measured cost holds for: the program's version, the processor and its threads, the algorithm, its
 /// target and format, and of OpenGL the driver. Opens no driver in this process that was tried in another.
 std::string costKey(const Resampler& resampler, const BindOptions& options, const Execution& execution);
 

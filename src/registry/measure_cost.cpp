@@ -12,7 +12,10 @@ namespace tessera {
 
 namespace {
 
-constexpr int kBoxEdge = 32;
+constexpr int kBoxEdge = 20;
+constexpr int kFewCells = 5, kManyCells = 12;
+constexpr double kQuickMs = 0.7;
+constexpr double kLeastMs = 1e-3;
 
 /// The unit cube, bent a little so that no face lies along the lattice, with 6 elements a cell.
 TetMesh bentCube(int cells) {
@@ -43,43 +46,52 @@ struct Trial {
     int edge;  // of the lattice, points
     double leastMs = std::numeric_limits<double>::infinity();
 
+    void sample(const Resampler& resampler, const BindOptions& options, const Execution& execution);
     TimedWork timed() const { return {{mesh->elementCount(), std::int64_t(edge) * edge * edge}, leastMs}; }
 };
 
-double sampleMs(const Resampler& resampler, const BindOptions& options, const Trial& trial,
-                const Execution& execution) {
-    const Box3d bounds = trial.mesh->boundsWorld();
-    const Lattice lattice = Lattice::axisParallel(bounds.min, bounds.size().x / (trial.edge - 1));
+void Trial::sample(const Resampler& resampler, const BindOptions& options, const Execution& execution) {
+    const Box3d bounds = mesh->boundsWorld();
+    const Lattice lattice = Lattice::axisParallel(bounds.min, bounds.size().x / (edge - 1));
     std::vector<IndexBox> boxes;
-    for (int z = 0; z < trial.edge; z += kBoxEdge)
-        for (int y = 0; y < trial.edge; y += kBoxEdge)
-            for (int x = 0; x < trial.edge; x += kBoxEdge)
-                boxes.push_back({Vec3i(x, y, z), Vec3i(x, y, z) + kBoxEdge});
+    Vec3i p;
+    for (p.z = 0; p.z < edge; p.z += kBoxEdge)
+        for (p.y = 0; p.y < edge; p.y += kBoxEdge)
+            for (p.x = 0; p.x < edge; p.x += kBoxEdge) boxes.push_back({p, p + kBoxEdge});
     const std::array fields{0};
     const Timer timer;
-    resampler.bind(*trial.mesh, fields, options)
+    resampler.bind(*mesh, fields, options)
         ->resample(
             lattice, boxes, [](std::size_t, const Block&) {}, execution);
-    return timer.elapsedMs();
+    leastMs = std::clamp(timer.elapsedMs(), kLeastMs, leastMs);
 }
 
 }  // namespace
 
 CostModel measureCost(const Resampler& resampler, const BindOptions& options, double budgetMs,
                       const Execution& execution) {
-    const TetMesh small = bentCube(8), large = bentCube(20);
-    std::array<Trial, 3> trials{Trial{&small, 32}, Trial{&large, 32}, Trial{&small, 64}};
     const Execution silent = execution.withoutProgress();
-    sampleMs(resampler, options, trials[0], silent);
+    const TetMesh first = bentCube(kFewCells);
+    Trial trial{&first, kBoxEdge};
+    trial.sample(resampler, options, silent);
     const Timer timer;
+    trial.leastMs = std::numeric_limits<double>::infinity();
+    trial.sample(resampler, options, silent);
+    // The longer it takes, the nearer it is to what large meshes take.
+    const int scale = trial.leastMs < kQuickMs ? 2 : 1;
+    const TetMesh few = bentCube(scale * kFewCells), many = bentCube(scale * kManyCells);
+    const int edge = scale * kBoxEdge;
+    std::array<Trial, 4> trials{Trial{&few, edge}, Trial{&many, edge}, Trial{&few, 2 * edge},
+                                Trial{&many, 2 * edge}};
     double roundMs = 0;
     for (int round = 0; round < 2 || timer.elapsedMs() + roundMs < budgetMs; ++round) {
         const Timer roundTimer;
-        for (Trial& trial : trials)
-            trial.leastMs = std::min(trial.leastMs, sampleMs(resampler, options, trial, silent));
+        for (Trial& one : trials) one.sample(resampler, options, silent);
         roundMs = roundTimer.elapsedMs();
     }
-    return fitCost(trials[0].timed(), trials[1].timed(), trials[2].timed());
+    std::array<TimedWork, 4> timed;
+    std::transform(trials.begin(), trials.end(), timed.begin(), [](const Trial& one) { return one.timed(); });
+    return fitCost(timed);
 }
 
 }  // namespace tessera

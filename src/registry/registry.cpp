@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "compute/compute_resampler.h"
+#include "gl/gl_platform.h"
 #include "hybrid/hybrid_resampler.h"
 #include "registry/cost_model.h"
 #include "registry/kept_costs.h"
@@ -76,6 +77,11 @@ std::ptrdiff_t fitOnes(const std::vector<Candidate>& candidates) {
 
 /// From the user's cache, or by measuring. One that fails meanwhile can't be chosen.
 void findCosts(std::vector<Candidate>& candidates, const BindOptions& options, const Execution& execution) {
+    const auto needsNoDriver = [](const Candidate& candidate) {
+        return candidate.whyNot.empty() && !candidate.resampler->info().isOnDevice;
+    };
+    const bool sparesDrivers =
+        !isGlRoomy() && std::any_of(candidates.begin(), candidates.end(), needsNoDriver);
     const double budgetMs = kMeasuringMs / double(fitOnes(candidates));
     const std::string path = costsPath();
     const KeptCosts kept = readCosts(path);
@@ -87,11 +93,20 @@ void findCosts(std::vector<Candidate>& candidates, const BindOptions& options, c
             candidate.cost = known->second;
             continue;
         }
+        if (sparesDrivers && candidate.resampler->info().isOnDevice) {
+            candidate.whyNot = "isn't measured where so little memory is allowed";
+            continue;
+        }
+        const auto leaveOut = [&](const std::exception& error) {
+            candidate.whyNot = "failed when it was measured (" + std::string(error.what()) + ")";
+        };
         try {
             candidate.cost = measureCost(*candidate.resampler, options, budgetMs, execution);
             measured[key] = candidate.cost;
         } catch (const GlError& error) {
-            candidate.whyNot = "failed when it was measured (" + std::string(error.what()) + ")";
+            leaveOut(error);
+        } catch (const InputError& error) {  // of one that the caller registered
+            leaveOut(error);
         }
     }
     if (!measured.empty()) keepCosts(path, measured);
