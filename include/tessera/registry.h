@@ -47,12 +47,12 @@ struct ResamplerChoice {
 };
 
 /// The resampler of that name, or, for "auto", the one that is predicted to take the least time among those
-/// that can run here with these options and are exact to 2^-8 voxel. Where there are several their times are
-/// measured, each within a fifth of a second beside what a driver takes to start, and kept for other
-/// processes in $XDG_CACHE_HOME/tessera or ~/.cache/tessera, if that can be written. What auto chooses
-/// depends on the machine, and so do the bits of the result: it is never the default. Throws InputError when
-/// there is none, with each one's reason, or when the named one can't run here or doesn't have the options;
-/// GlError when that is for want of OpenGL.
+/// that can run here with these options and are exact to 2^-8 voxel. Where there are several, what they cost
+/// is measured, which takes a fifth of a second beside the start of drivers, and kept for other processes in
+/// $XDG_CACHE_HOME/tessera or ~/.cache/tessera, if that can be written. What auto chooses depends on the
+/// machine, and so do the bits of the result: it is never the default. Throws InputError when there is none,
+/// with each one's reason, or when the named one can't run here or doesn't have the options; GlError when
+/// that is for want of OpenGL.
 ResamplerChoice chooseResampler(std::string_view name, const BindOptions& options = {},
                                 const WorkSize& work = {}, const Execution& execution = {});
 /// The same among given ones.
