@@ -148,8 +148,8 @@ void addAlgorithmOptions(CLI::App& command, AlgorithmArguments& a) {
     const std::string group = "How to sample";
     command
         .add_option("--algorithm", a.name,
-                    "the resampler, or auto: the fastest that this machine has (results may then differ from "
-                    "machine to machine)")
+                    "the resampler, or auto: the one that is predicted to be fastest, from times measured on "
+                    "this machine (results may then differ from machine to machine)")
         ->capture_default_str()
         ->group(group);
     addBindOptions(command, a);

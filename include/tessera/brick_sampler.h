@@ -12,7 +12,7 @@ namespace tessera {
 
 /// What a BrickSampler samples, and by what.
 struct SamplerOptions {
-    /// A name that registry.h knows; "auto": the fastest that this machine has.
+    /// A name that registry.h knows; "auto": what is predicted to be fastest here.
     std::string algorithm = "software";
     /// Names of fields; "point:T" and "cell:T" tell two of one name apart. Empty: all.
     std::vector<std::string> fields{};

@@ -65,7 +65,7 @@ struct FixedFrame {
 
 /// What to make of a mesh.
 struct BrickOptions {
-    /// A name that registry.h knows; "auto": the fastest that this machine has.
+    /// A name that registry.h knows; "auto": what is predicted to be fastest here.
     std::string algorithm = "software";
     /// Of an algorithm with several: one of Resampler::targets(); empty: the first.
     std::string target{};

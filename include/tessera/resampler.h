@@ -132,10 +132,6 @@ class Resampler {
     /// Code paths this processor or driver offers, the default first: "AVX3", "AVX2", "SSE4", or
     /// "egl-device", "egl-surfaceless", "osmesa".
     virtual std::vector<std::string> targets() const { return {"default"}; }
-    /// Time that sampling takes on this machine as a multiple of the software resampler's: a rough guess, for
-    /// the choice of an algorithm. A graphics device that is emulated on the processor counts as slow. Asked
-    /// only when unavailableReason() is empty.
-    virtual double relativeCost() const { return 1; }
     /// The same on every machine.
     virtual WorkMemory workMemory(int channels) const;
     /// @param fields indices into mesh.fields; channels of the blocks are their components, in this order.

@@ -136,6 +136,10 @@ bool isSoftwareRenderer(const std::string& renderer) {
     return false;
 }
 
+std::string driverText(const GlDeviceInfo& info) {
+    return info.vendor + ", " + info.renderer + ", " + info.version;
+}
+
 GlDeviceInfo queryGlDevice(const GlFunctions& gl) {
     GlDeviceInfo info;
     info.vendor = stringOf(gl, GL_VENDOR);

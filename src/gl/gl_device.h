@@ -57,6 +57,9 @@ struct GlDeviceInfo {
     std::vector<std::string> extensions;  ///< those present among the ones Tessera could use
 };
 
+/// Vendor, renderer and version: tells one driver from another.
+std::string driverText(const GlDeviceInfo& info);
+
 /// Asks the current context, and tries its formats.
 GlDeviceInfo queryGlDevice(const GlFunctions& gl);
 

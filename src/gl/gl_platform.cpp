@@ -21,6 +21,7 @@ struct Probe {
     std::string reason;
     bool isFault = false;
     bool isSoftware = false;
+    std::string driver{};
 };
 
 /// What creating a context told; a reason, where it failed.
@@ -50,6 +51,11 @@ class Probes {
         trial_ = std::move(trial);
     }
 
+    bool isRoomy() {
+        const std::lock_guard lock(mutex_);
+        return !trial_ || trial_->isRoomy();
+    }
+
     /// Finds out what isn't known yet. Only the first call for a platform takes time.
     void probe(std::span<const GlPlatform> platforms) {
         const std::lock_guard lock(mutex_);
@@ -60,11 +66,14 @@ class Probes {
         if (trial_ && !unknown.empty()) results = tryGl(*trial_, unknown);
         for (std::size_t i = 0; i < unknown.size(); ++i) {
             GlTrialResult& result = results[i];
-            if (result.reason.empty() && result.found != kSoftwareFound && result.found != kHardwareFound) {
+            const bool isSoftware = result.found.starts_with(kSoftwareFound);
+            if (isSoftware || result.found.starts_with(kHardwareFound)) {
+                slot(unknown[i]) = {{}, false, isSoftware, result.found.substr(result.found.find(' ') + 1)};
+            } else if (result.reason.empty()) {
                 const OpenedDevice& device = opened(unknown[i]);
-                slot(unknown[i]) = {device.reason, false, device.info.isSoftware};
+                slot(unknown[i]) = {device.reason, false, device.info.isSoftware, driverText(device.info)};
             } else {
-                slot(unknown[i]) = {std::move(result.reason), result.isFault, result.found == kSoftwareFound};
+                slot(unknown[i]) = {std::move(result.reason), result.isFault};
             }
         }
     }
@@ -155,6 +164,10 @@ void tryGlFirst(GlTrial trial) {
     probes().setTrial(std::move(trial));
 }
 
+bool isGlRoomy() {
+    return probes().isRoomy();
+}
+
 const std::string& unavailableReason(GlPlatform platform) {
     return probeOf(platform).reason;
 }
@@ -186,6 +199,10 @@ const GlDeviceInfo& glDeviceInfo(GlPlatform platform) {
 
 bool isSoftwareGl(GlPlatform platform) {
     return probeOf(platform).isSoftware;
+}
+
+const std::string& glDriver(GlPlatform platform) {
+    return probeOf(platform).driver;
 }
 
 const std::vector<GlPlatform>& availableGlPlatforms() {

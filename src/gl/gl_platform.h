@@ -23,6 +23,9 @@ GlPlatform parseGlPlatform(std::string_view name);
 /// From now on a platform is tried by this program before this process uses it for the first time.
 void tryGlFirst(GlTrial trial);
 
+/// There is memory for drivers that may not be needed: GlTrial::isRoomy(), or there is no trial.
+bool isGlRoomy();
+
 /// Why no OpenGL 4.5 core context can be had from this platform, in one sentence; empty when it can. Found
 /// out once a process, by the trial, or where none is set by creating one. May be called from any thread, and
 /// leaves the caller's context alone. @throws Cancelled as the trial does.
@@ -39,6 +42,9 @@ void throwIfUnavailable(GlPlatform platform);
 
 /// The processor emulates the device of an available platform.
 bool isSoftwareGl(GlPlatform platform);
+
+/// driverText() of an available platform's device.
+const std::string& glDriver(GlPlatform platform);
 
 /// Opens the device in this process; only the first call for a platform takes time. Why that isn't possible,
 /// which it may not be though a trial found it available; else empty.

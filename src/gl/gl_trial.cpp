@@ -31,7 +31,6 @@ constexpr std::string_view kGreeting = "trial\n";
 constexpr std::size_t kLongestReason = 512;  // a pipe takes that and the greeting without a reader
 constexpr int kExitUnavailable = 3;
 constexpr double kLeastSeconds = 1.5;  // of a driver that is tried behind another
-constexpr std::int64_t kAtOnceBytes = std::int64_t(1) << 30;
 constexpr double kTickMs = 2;
 
 const ShaderText kTriangleVert{"trial.vert.glsl", R"(
@@ -146,7 +145,7 @@ void write(std::string_view text) {
 std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std::string> words) {
     std::vector<GlTrialResult> results(words.size());
     std::vector<std::optional<Trial>> trials(words.size());
-    const bool isAtOnce = trial.maxMemoryBytes == 0 || trial.maxMemoryBytes >= kAtOnceBytes;
+    const bool isAtOnce = trial.isRoomy();
     std::size_t started = 0;
     double spentMs = 0;
     Timer timer;
@@ -208,7 +207,8 @@ int serveGlTrial(std::span<const std::string> arguments) {
     return serveTrial(arguments, [](const std::string& name) {
         GlContext context(parseGlPlatform(name));
         drawTexels(context);
-        return std::string(context.info().isSoftware ? kSoftwareFound : kHardwareFound);
+        return std::string(context.info().isSoftware ? kSoftwareFound : kHardwareFound) +
+               driverText(context.info());
     });
 }
 

@@ -23,6 +23,9 @@ struct GlTrial {
     double seconds = 20;                 ///< that it may take until the end
     const std::atomic<bool>* cancel = nullptr;
     std::int64_t maxMemoryBytes = 0;  ///< that is aimed at; emulated ones take 60 MB each. 0: no bound
+
+    /// Memory isn't bounded to less than 1 GiB.
+    bool isRoomy() const { return maxMemoryBytes == 0 || maxMemoryBytes >= std::int64_t(1) << 30; }
 };
 
 /// What came of it.
@@ -46,8 +49,9 @@ std::vector<GlTrialResult> tryDrivers(const GlTrial& trial, std::span<const std:
 int serveTrial(std::span<const std::string> arguments,
                const std::function<std::string(const std::string&)>& use);
 
-/// What tryGl finds: a device that the processor emulates, or another.
-inline constexpr std::string_view kSoftwareFound = "software", kHardwareFound = "hardware";
+/// What tryGl finds begins with one of these: a device that the processor emulates, or another. driverText()
+/// follows.
+inline constexpr std::string_view kSoftwareFound = "software: ", kHardwareFound = "hardware: ";
 
 /// tryDrivers for platforms: makes a context, compiles shaders, draws and reads back.
 std::vector<GlTrialResult> tryGl(const GlTrial& trial, std::span<const GlPlatform> platforms);

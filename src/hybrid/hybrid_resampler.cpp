@@ -4,17 +4,12 @@
 
 namespace tessera {
 
-namespace {
-/// It leaves less to the device than substitute geometry does.
-constexpr double kShareOfSlicing = 0.7;
-}  // namespace
-
 HybridResampler::HybridResampler()
     : RasterResampler("hybrid", "marching-tetrahedra slice polygons filled by OpenGL", Method::arithmetic,
-                      std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
+                      std::make_unique<SlicePolygonGenerator>()) {}
 
 Hybrid2001Resampler::Hybrid2001Resampler()
     : RasterResampler("hybrid-2001", "slice polygons filled by the fill rule, as published: misses points",
-                      Method::published, std::make_unique<SlicePolygonGenerator>(), kShareOfSlicing) {}
+                      Method::published, std::make_unique<SlicePolygonGenerator>()) {}
 
 }  // namespace tessera

@@ -6,10 +6,19 @@ namespace tessera {
 
 AlgorithmChoice::AlgorithmChoice(const std::string& name, const BindOptions& options, Job& job)
     : options_(options), job_(job) {
-    if (name == "auto") checkGlTarget(options.target);
+    if (name == "auto") {
+        checkGlTarget(options.target);
+        return;
+    }
     choice_ = chooseResampler(name, options);
-    if (!choice_.reason.empty()) job.say(choice_.reason + "\n");
     warnOfDrivers(job);
+}
+
+void AlgorithmChoice::chooseFor(const WorkSize& work) {
+    if (choice_.resampler) return;
+    choice_ = chooseResampler("auto", options_, work, job_.execution);
+    job_.say(choice_.reason + "\n");
+    warnOfDrivers(job_);
 }
 
 void warnOfDrivers(Job& job) {

@@ -8,12 +8,16 @@
 namespace tessera {
 
 /// The resampler that a job works with. Where "auto" chose one on a device and that fails, the job goes on
-/// with the best that needs none.
+/// with the quickest that needs none.
 class AlgorithmChoice {
   public:
-    /// Says what "auto" chose, and warns of drivers that crashed or stalled. Throws what chooseResampler
-    /// does, and GlError when "auto" is to take an OpenGL platform that can't be had.
+    /// Throws what chooseResampler does for an algorithm that is named, and GlError when "auto" is to take an
+    /// OpenGL platform that can't be had.
     AlgorithmChoice(const std::string& name, const BindOptions& options, Job& job);
+
+    /// To be called before all else: has "auto" choose, by the first work that it gets, and says what it
+    /// chose. Warns of drivers that crashed or stalled. Throws what chooseResampler does.
+    void chooseFor(const WorkSize& work);
 
     const Resampler& resampler() const { return *choice_.resampler; }
     const std::string& reason() const { return choice_.reason; }
@@ -23,7 +27,7 @@ class AlgorithmChoice {
     template <class Work>
     auto run(const Work& work) {
         const Resampler* first = choice_.resampler;
-        return runChosen(choice_, options_, [&](const Resampler& resampler) {
+        return runChosen(choice_, [&](const Resampler& resampler) {
             if (&resampler != first) job_.warn(choice_.reason);
             return work(resampler);
         });

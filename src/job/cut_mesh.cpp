@@ -243,6 +243,9 @@ CutResult CutRun::run() {
     const PlaneQuery query(mesh, job_.execution);
     result_.times.indexMs = timer.restart();
     CutOptions options = request_.cut;
+    // A plane meets about as many elements of a cube.
+    choice_.chooseFor({std::int64_t(2 * std::pow(double(mesh.elementCount()), 2.0 / 3)),
+                       std::int64_t(options.resolution) * options.resolution});
     choice_.run([&](const Resampler& resampler) {
         options.spillVoxels = resampler.info().spillBoundVoxels;
         result_.cut = planCut(mesh, query, options);

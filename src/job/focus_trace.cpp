@@ -16,6 +16,7 @@
 #include "job/output_paths.h"
 #include "job/repair_report.h"
 #include "job/report_text.h"
+#include "refine/plan_frame.h"
 #include "schedule/brick_scheduler.h"
 #include "tessera/error.h"
 
@@ -185,6 +186,11 @@ FocusTrace FocusTraceRun::run() {
                              request_.repair, job_);
     trace_.times.readMs = timer.elapsedMs();
     tellRepair(request_.input, trace_.file, job_);
+    const TetMesh& mesh = trace_.file.mesh;
+    RefineOptions finest;
+    finest.resolution = request_.resolution;
+    finest.spacingWorld = request_.spacingWorld;
+    choice_.chooseFor({mesh.elementCount(), expectedPoints(mesh, trace_.file.boundsWorld, finest)});
     choice_.run([&](const Resampler& resampler) {
         prepare(resampler);
         follow();

@@ -17,6 +17,7 @@
 #include "job/series_steps.h"
 #include "job/vdb_contents.h"
 #include "refine/plan.h"
+#include "refine/plan_frame.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "vdb/vdb_metadata.h"
@@ -177,6 +178,7 @@ void ResampleRun::surveySeries(const std::vector<ResampleStep>& steps) {
 /// The finest step decides the spacing for all: the first one is often a field at rest, which any spacing
 /// shows well.
 void ResampleRun::surveySpacing(const TetMesh& mesh) {
+    choice_.chooseFor({mesh.elementCount(), expectedPoints(mesh, mesh.boundsWorld(), request_.refine)});
     const StepPlan plan = planStep(mesh, request_, choice_.resampler());
     const FieldSelection& selection = plan.selection;
     const BrickTree tree =
@@ -196,6 +198,8 @@ Json ResampleRun::runStep(const ResampleStep& step) {
     Timer timer;
     const ImportedMesh file = read(step);
     times.readMs = timer.elapsedMs();
+    choice_.chooseFor(
+        {file.mesh.elementCount(), expectedPoints(file.mesh, file.boundsWorld, request_.refine)});
     const StepPlan plan = planStep(file.mesh, request_, choice_.resampler());
     checkOutputFields(plan.selection.outputs, request_.shape.hasSurface());
     sayImport(step, file, plan);

@@ -1,5 +1,6 @@
 #include "tessera/brick_sampler.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "library/field_choice.h"
@@ -13,6 +14,7 @@ namespace tessera {
 namespace {
 
 constexpr int kLongestEdge = 1024;
+constexpr std::int64_t kUsualPoints = 32 * 32 * 32;
 /// Lattice points have indices within it.
 constexpr double kFarthestIndex = 0x1p29;
 
@@ -31,9 +33,11 @@ BrickSampler::BrickSampler(const TetMesh& mesh, const SamplerOptions& options)
     bind.route = Route::index;
     bind.index = std::make_shared<const SharedElementIndex>(mesh);
     tryDriversFor(options.algorithm);
-    ResamplerChoice choice = chooseResampler(options.algorithm, bind);
+    // Of a brick, with an element a point or as many as there are.
+    ResamplerChoice choice =
+        chooseResampler(options.algorithm, bind, {std::min(mesh.elementCount(), kUsualPoints), kUsualPoints});
     parts_->bound = runChosen(
-        choice, bind, [&](const Resampler& resampler) { return resampler.bind(mesh, chosen.fields, bind); });
+        choice, [&](const Resampler& resampler) { return resampler.bind(mesh, chosen.fields, bind); });
     const Box3d bounds = mesh.boundsWorld();
     if (bounds.empty()) throw InputError("the mesh has no elements");
     parts_->originWorld = bounds.min;

@@ -8,6 +8,7 @@
 #include "library/brick_parts.h"
 #include "library/program.h"
 #include "refine/error_samples.h"
+#include "refine/plan_frame.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
@@ -53,8 +54,11 @@ std::unique_ptr<Bricks::Parts> makeParts(const TetMesh& mesh, const BrickOptions
     parts->chosen = chooseFields(mesh, options.fields);
     parts->refine = refineOptions(mesh, parts->chosen, options);
     tryDriversFor(options.algorithm, options.maxMemoryBytes);
-    ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind);
-    parts->result = runChosen(choice, parts->refine.bind, [&](const Resampler& resampler) {
+    WorkSize work;
+    if (options.algorithm == "auto")
+        work = {mesh.elementCount(), expectedPoints(mesh, meshBounds(mesh, execution), parts->refine)};
+    ResamplerChoice choice = chooseResampler(options.algorithm, parts->refine.bind, work, execution);
+    parts->result = runChosen(choice, [&](const Resampler& resampler) {
         return makeBricks(mesh, parts->chosen.fields, resampler, parts->refine, execution);
     });
     parts->resampler = choice.resampler;

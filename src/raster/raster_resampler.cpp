@@ -26,9 +26,6 @@ namespace tessera {
 
 namespace {
 
-/// Resampler::relativeCost(): of a graphics device, and of one emulated on the processor.
-constexpr double kDeviceCost = 0.3, kEmulatedCost = 5;
-
 /// A region on its way through the device.
 struct RegionJob {
     RasterRegion region;
@@ -617,7 +614,7 @@ void BoundRaster::Run::copyChannels(const RasterRegion& region, const RasterRegi
 }  // namespace
 
 RasterResampler::RasterResampler(std::string name, std::string description, Method method,
-                                 std::unique_ptr<const SliceGenerator> generator, double cost)
+                                 std::unique_ptr<const SliceGenerator> generator)
     : Resampler({.name = std::move(name),
                  .description = std::move(description),
                  .isOnDevice = true,
@@ -627,15 +624,10 @@ RasterResampler::RasterResampler(std::string name, std::string description, Meth
                  .spillBoundVoxels = 0x1p-8,
                  .placeBoundVoxels = 0x1p-8}),
       method_(method),
-      generator_(std::move(generator)),
-      cost_(cost) {}
+      generator_(std::move(generator)) {}
 
 std::string RasterResampler::unavailableReason() const {
     return availableGlPlatforms().empty() ? noGlReason() : std::string();
-}
-
-double RasterResampler::relativeCost() const {
-    return cost_ * (isSoftwareGl(availableGlPlatforms().front()) ? kEmulatedCost : kDeviceCost);
 }
 
 WorkMemory RasterResampler::workMemory(int channels) const {

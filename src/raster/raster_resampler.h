@@ -19,7 +19,6 @@ class RasterResampler : public Resampler {
   public:
     std::string unavailableReason() const override;
     std::vector<std::string> targets() const override;
-    double relativeCost() const override;
     WorkMemory workMemory(int channels) const override;
     std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
                                          const BindOptions& options = {}) const override;
@@ -31,14 +30,13 @@ class RasterResampler : public Resampler {
         scan,        ///< the same, by compute shaders that go through the points of each element's box
         published,   ///< as in the paper: 2D alpha textures, Gouraud fill
     };
-    /// @param generator of primitives; a scan needs none. @param cost share of what a device usually takes.
+    /// @param generator of primitives; a scan needs none.
     RasterResampler(std::string name, std::string description, Method method,
-                    std::unique_ptr<const SliceGenerator> generator, double cost = 1);
+                    std::unique_ptr<const SliceGenerator> generator);
 
   private:
     Method method_;
     std::shared_ptr<const SliceGenerator> generator_;  // shared with what is bound
-    double cost_;
 };
 
 }  // namespace tessera

@@ -225,6 +225,18 @@ PlanFrame chooseFrame(const Box3d& meshBox, const RefineOptions& options) {
     return frame;
 }
 
+std::int64_t expectedPoints(const TetMesh& mesh, const Box3d& meshBox, const RefineOptions& options) {
+    const Box3d box = options.boundsWorld ? *options.boundsWorld : meshBox;
+    const Box3d sampled{glm::max(box.min, meshBox.min), glm::min(box.max, meshBox.max)};
+    const Vec3d edges = sampled.size() / focusSpacing(meshBox, options) + 1.0;
+    double points = edges.x * edges.y * edges.z;
+    if (!options.criterion.has(Criterion::uniform))
+        points = std::min(points, double(mesh.elementCount()) * std::pow(options.samplesPerElement, 3));
+    const double most = double(leafBudget(options, 1)) * std::pow(double(options.brickCells), 3);
+    points = std::min(points, most);
+    return points > 1 ? std::int64_t(points) : 1;
+}
+
 std::size_t leafBudget(const RefineOptions& options, int channels) {
     const double bytesPerPoint = 4.0 * channels + 0.125;
     double points = 2147483648.0;

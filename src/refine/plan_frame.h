@@ -30,6 +30,11 @@ PlanFrame chooseFrame(const Box3d& meshBoundsWorld, const RefineOptions& options
 /// The finest spacing, or that of 256 points where none is given: h_0 of focuses.
 double focusSpacing(const Box3d& meshBoundsWorld, const RefineOptions& options);
 
+/// About how many points are sampled, before there is a plan: the finest lattice's in the bounds or, where
+/// bricks differ, samplesPerElement^3 an element if that is less; no more than the bounds on voxels and
+/// memory allow. Takes any options.
+std::int64_t expectedPoints(const TetMesh& mesh, const Box3d& meshBoundsWorld, const RefineOptions& options);
+
 /// Leaves that the bounds on voxels and memory allow.
 std::size_t leafBudget(const RefineOptions& options, int channels);
 

@@ -6,7 +6,11 @@
 #include <vector>
 
 #include "compute/compute_resampler.h"
+#include "gl/gl_platform.h"
 #include "hybrid/hybrid_resampler.h"
+#include "registry/cost_model.h"
+#include "registry/kept_costs.h"
+#include "registry/measure_cost.h"
 #include "slicing/slicing_resampler.h"
 #include "software/software_resampler.h"
 #include "tessera/error.h"
@@ -64,6 +68,50 @@ std::string whyUnfit(const Resampler& resampler, const BindOptions& options) {
     return whyNot(resampler, options, true);
 }
 
+constexpr double kMeasuringMs = 200;  // of all algorithms together
+
+std::ptrdiff_t fitOnes(const std::vector<Candidate>& candidates) {
+    return std::count_if(candidates.begin(), candidates.end(),
+                         [](const Candidate& candidate) { return candidate.whyNot.empty(); });
+}
+
+/// From the user's cache, or by measuring. One that fails meanwhile can't be chosen.
+void findCosts(std::vector<Candidate>& candidates, const BindOptions& options, const Execution& execution) {
+    const auto needsNoDriver = [](const Candidate& candidate) {
+        return candidate.whyNot.empty() && !candidate.resampler->info().isOnDevice;
+    };
+    const bool sparesDrivers =
+        !isGlRoomy() && std::any_of(candidates.begin(), candidates.end(), needsNoDriver);
+    const double budgetMs = kMeasuringMs / double(fitOnes(candidates));
+    const std::string path = costsPath();
+    const KeptCosts kept = readCosts(path);
+    KeptCosts measured;
+    for (Candidate& candidate : candidates) {
+        if (!candidate.whyNot.empty()) continue;
+        const std::string key = costKey(*candidate.resampler, options, execution);
+        if (const auto known = kept.find(key); known != kept.end()) {
+            candidate.cost = known->second;
+            continue;
+        }
+        if (sparesDrivers && candidate.resampler->info().isOnDevice) {
+            candidate.whyNot = "isn't measured where so little memory is allowed";
+            continue;
+        }
+        const auto leaveOut = [&](const std::exception& error) {
+            candidate.whyNot = "failed when it was measured (" + std::string(error.what()) + ")";
+        };
+        try {
+            candidate.cost = measureCost(*candidate.resampler, options, budgetMs, execution);
+            measured[key] = candidate.cost;
+        } catch (const GlError& error) {
+            leaveOut(error);
+        } catch (const InputError& error) {  // of one that the caller registered
+            leaveOut(error);
+        }
+    }
+    if (!measured.empty()) keepCosts(path, measured);
+}
+
 std::vector<const Resampler*>& registered() {
     static const SoftwareResampler software;
     static const SlicingResampler slicing;
@@ -100,56 +148,37 @@ const Resampler& namedResampler(std::string_view name) {
     return named(resamplers(), name);
 }
 
-ResamplerChoice chooseResampler(std::string_view name, const BindOptions& options) {
-    return chooseResampler(resamplers(), name, options);
+ResamplerChoice chooseResampler(std::string_view name, const BindOptions& options, const WorkSize& work,
+                                const Execution& execution) {
+    return chooseResampler(resamplers(), name, options, work, execution);
 }
 
 ResamplerChoice chooseResampler(std::span<const Resampler* const> candidates, std::string_view name,
-                                const BindOptions& options) {
+                                const BindOptions& options, const WorkSize& work,
+                                const Execution& execution) {
     if (name != "auto") {
         const Resampler& resampler = available(named(candidates, name));
         // Where targets are devices, binding says best why one can't be had.
         const std::string reason = whyNot(resampler, options, resampler.info().targetsAgree);
         if (!reason.empty()) throw InputError("algorithm " + std::string(name) + " " + reason);
-        return {&resampler, {}};
+        return {&resampler, {}, {}};
     }
-    ResamplerChoice choice;
-    std::vector<std::string> others;
-    for (const Resampler* resampler : candidates) {
-        const std::string reason = whyUnfit(*resampler, options);
-        if (!reason.empty()) {
-            others.push_back(std::string(resampler->name()) + " " + reason);
-            continue;
-        }
-        if (choice.resampler && choice.resampler->relativeCost() <= resampler->relativeCost()) {
-            others.push_back(std::string(resampler->name()) + " is slower here");
-            continue;
-        }
-        if (choice.resampler) others.push_back(std::string(choice.resampler->name()) + " is slower here");
-        choice.resampler = resampler;
-    }
-    std::string list;
-    for (const std::string& other : others) list += (list.empty() ? "" : "; ") + other;
-    if (!choice.resampler) throw InputError("no algorithm can be chosen automatically: " + list);
-    choice.reason = "auto chose " + std::string(choice.resampler->name()) +
-                    (list.empty() ? ", the only one there is" : ": " + list);
-    return choice;
+    std::vector<Candidate> judged;
+    for (const Resampler* resampler : candidates)
+        judged.push_back({resampler, whyUnfit(*resampler, options)});
+    if (fitOnes(judged) > 1) findCosts(judged, options, execution);
+    return chooseByCost(judged, work);
 }
 
-std::optional<ResamplerChoice> chooseInstead(const ResamplerChoice& failed, const std::string& failure,
-                                             const BindOptions& options) {
+std::optional<ResamplerChoice> chooseInstead(const ResamplerChoice& failed, const std::string& failure) {
     if (failed.reason.empty() || !failed.resampler->info().isOnDevice) return std::nullopt;
-    std::vector<const Resampler*> others;
-    for (const Resampler* other : resamplers())
-        if (!other->info().isOnDevice) others.push_back(other);
-    try {
-        ResamplerChoice choice = chooseResampler(others, "auto", options);
-        choice.reason = std::string(failed.resampler->name()) + " failed here (" + failure +
-                        "), so auto goes on with " + std::string(choice.resampler->name());
-        return choice;
-    } catch (const InputError&) {  // none has the options
-        return std::nullopt;
-    }
+    for (const Resampler* other : failed.others)
+        if (!other->info().isOnDevice)
+            return ResamplerChoice{other,
+                                   failed.resampler->name() + " failed here (" + failure +
+                                       "), so auto goes on with " + other->name(),
+                                   {}};
+    return std::nullopt;
 }
 
 }  // namespace tessera

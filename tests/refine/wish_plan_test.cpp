@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -177,6 +178,29 @@ TEST(WishPlan, GivesBalanceFirstAndStaysBalanced) {
     ASSERT_EQ(leaves.size(), planned.size());
     ASSERT_EQ(leaves.size(), planning.plan.leafCount());
     for (std::size_t i = 0; i < leaves.size(); ++i) EXPECT_EQ(leaves[i].key, planning.bricks.key(planned[i]));
+}
+
+TEST(ExpectedPoints, AreThoseOfTheLatticeOrOfTheElements) {
+    const TetMesh mesh = ballMesh(7, 0.9);
+    const Box3d bounds{Vec3d(0), Vec3d(2, 1, 1)};
+    RefineOptions options;
+    options.criterion = Criterion::uniform;
+    options.resolution = 101;
+    EXPECT_NEAR(double(expectedPoints(mesh, bounds, options)), 101 * 51 * 51, 1);
+    options.boundsWorld = Box3d{Vec3d(1, 0.5, -1), Vec3d(3, 2, 2)};  // 101 points along 3
+    EXPECT_NEAR(double(expectedPoints(mesh, bounds, options)),
+                (1 / 0.03 + 1) * (0.5 / 0.03 + 1) * (1 / 0.03 + 1), 1);
+    options.boundsWorld.reset();
+    options.criterion = Criterion::elementSize;
+    EXPECT_EQ(expectedPoints(mesh, bounds, options),
+              std::min<std::int64_t>(8 * mesh.elementCount(), 101 * 51 * 51));
+    options.maxVoxels = 16 * 16 * 16;
+    EXPECT_EQ(expectedPoints(mesh, bounds, options), 16 * 16 * 16);
+    // Not yet checked ones.
+    options.samplesPerElement = std::nan("");
+    options.spacingWorld = std::nan("");
+    options.resolution = -3;
+    EXPECT_GE(expectedPoints(mesh, Box3d(), options), 1);
 }
 
 // The bricks are those that lists of elements give, within bounds too.
