@@ -164,9 +164,10 @@ std::vector<Row> measureMesh(const Options& options, const std::string& path) {
     const Task task = makeTask(file.mesh, options.points);
     const std::vector<int> fields = file.mesh.fields.empty() ? std::vector<int>{} : std::vector<int>{0};
     std::vector<std::unique_ptr<tessera::BoundResampler>> bound;
+    tessera::BindOptions asPublished;
+    asPublished.primitives = tessera::Primitives::processor;
     for (const std::string& name : options.algorithms) {
-        bound.push_back(tessera::findResampler(name).bind(file.mesh, fields,
-                                                          {.primitives = tessera::Primitives::processor}));
+        bound.push_back(tessera::findResampler(name).bind(file.mesh, fields, asPublished));
         runOnce(*bound.back(), task, options.threads);
     }
     std::vector<std::vector<Sample>> samples(bound.size());

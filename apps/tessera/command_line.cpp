@@ -581,7 +581,8 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
     command.add_option("mesh", a.request.meshes, "mesh files")->required();
     command.add_option(
         "--algorithms", a.request.algorithms,
-        "names with commas between them, each with a target if wanted: software,slicing:osmesa; "
+        "names with commas between them, each with a target if wanted, or with who makes its primitives: "
+        "software,slicing:osmesa,hybrid:processor; "
         "the first is what the others are compared with (default: all that can run here)");
     addBindOptions(command, a.algorithm);
     auto* resolution = command
@@ -615,6 +616,7 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
         "Examples:\n  tessera compare mesh.vtu\n"
         "  tessera compare mesh.vtu --algorithms software,slicing,hybrid --resolution 256 --field pressure\n"
         "  tessera compare mesh.vtu --algorithms software,slicing --sample-format r8 --json report.json\n"
+        "  tessera compare mesh.vtu --algorithms hybrid,hybrid:processor --resolution 256\n"
         "  tessera compare *.vtu --markdown");
 }
 

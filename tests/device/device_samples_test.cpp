@@ -6,7 +6,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <numeric>
+#include <utility>
 
 #include "compute/compute_resampler.h"
 #include "gl/gl_platform.h"
@@ -145,9 +147,9 @@ class SamplesOnDevice : public DeviceSlotsTest, public testing::WithParamInterfa
 TEST_P(SamplesOnDevice, AreThoseThatAreReadBack) {
     TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
     const SlicingResampler slicing;
+    const HybridResampler hybrid;
     const ComputeResampler compute;
-    for (const Resampler* resampler :
-         {static_cast<const Resampler*>(&slicing), static_cast<const Resampler*>(&compute)}) {
+    for (const Resampler* resampler : std::initializer_list<const Resampler*>{&slicing, &hybrid, &compute}) {
         const auto bound = resampler->bind(mesh, fields, {"egl-surfaceless", GetParam()});
         GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
         const auto slots =
@@ -199,6 +201,97 @@ INSTANTIATE_TEST_SUITE_P(All, SamplesOnDevice,
                          [](const testing::TestParamInfo<SampleFormat>& param) {
                              return std::string(nameOf(param.param));
                          });
+
+/// Counts the dispatches that a device is given, and the threads of them, while it lives.
+class DispatchCount {
+  public:
+    explicit DispatchCount(GlThread& thread) : thread_(thread) {
+        dispatches = 0;
+        thread_.run([&](GlContext& context) {
+            exchange(context, true);
+            threads_ = GlQuery(context, kComputeInvocations);
+            threads_.begin();
+        });
+    }
+    ~DispatchCount() {
+        thread_.run([&](GlContext& context) {
+            exchange(context, false);
+            threads_.reset();
+        });
+    }
+    /// Once.
+    std::uint64_t threads() {
+        return thread_.run([&](GlContext&) {
+            threads_.end();
+            return threads_.result();
+        });
+    }
+    static inline int dispatches = 0;
+
+  private:
+    static constexpr GLenum kComputeInvocations = 0x82F5;  // GL_ARB_pipeline_statistics_query
+
+    static void exchange(GlContext& context, bool isCounted) {
+        auto& gl = const_cast<GlFunctions&>(context.functions());
+        if (isCounted) direct = gl.DispatchCompute, indirect = gl.DispatchComputeIndirect;
+        gl.DispatchCompute = isCounted ? countDirect : direct;
+        gl.DispatchComputeIndirect = isCounted ? countIndirect : indirect;
+    }
+    static void APIENTRY countDirect(GLuint x, GLuint y, GLuint z) {
+        ++dispatches;
+        direct(x, y, z);
+    }
+    static void APIENTRY countIndirect(GLintptr at) {
+        ++dispatches;
+        indirect(at);
+    }
+    static inline decltype(GlFunctions::DispatchCompute) direct = nullptr;
+    static inline decltype(GlFunctions::DispatchComputeIndirect) indirect = nullptr;
+
+    GlThread& thread_;
+    GlQuery threads_;
+};
+
+TEST(ABrickOnTheDevice, CostsWhatIsNearItAndAFewDispatches) {
+    TESSERA_NEEDS_GL(GlPlatform::eglSurfaceless);
+    GlThread& thread = sharedGlThread(GlPlatform::eglSurfaceless);
+    if (std::ranges::count(thread.info().extensions, "GL_ARB_pipeline_statistics_query") == 0)
+        GTEST_SKIP() << "this device doesn't count threads";
+    const auto boxOf = [](int cells, bool hasCompany) {
+        TetMesh mesh = boxMesh({.cells = Vec3i(cells), .sizeWorld = Vec3d(16), .jitter = 0.2});
+        if (hasCompany) {
+            TetMesh company = boxMesh({.cells = Vec3i(20), .sizeWorld = Vec3d(160), .jitter = 0.2});
+            for (Vec3d& point : company.points) point += 100.0;
+            appendMesh(mesh, company);
+        }
+        addPointField(mesh, "linear", {[](const Vec3d& p) { return p.x; }});
+        return mesh;
+    };
+    const IndexBox brick{Vec3i(0), Vec3i(17)};
+    const auto count = [&](const TetMesh& mesh) {
+        const std::vector<int> fields{0};
+        const auto bound =
+            ComputeResampler().bind(mesh, fields, {.target = "egl-surfaceless", .route = Route::index});
+        const auto slots = DeviceSamples::make(
+            thread, std::span(&brick, 1), codingsOf(mesh, fields, SampleFormat::r32f), SampleFormat::r32f);
+        const Lattice lattice = Lattice::axisParallel(Vec3d(0.01), 1);
+        bound->resampleToDevice(lattice, std::span(&brick, 1), *slots, {});  // compiles shaders
+        DispatchCount counted(thread);
+        bound->resampleToDevice(lattice, std::span(&brick, 1), *slots, {});
+        return std::pair(counted.threads(), counted.dispatches);
+    };
+    const auto alone = count(boxOf(6, false)), inCompany = count(boxOf(6, true));
+    EXPECT_EQ(inCompany, alone);
+    constexpr int kMostDispatches = 32;
+    for (const int cells : {1, 3, 12}) {
+        const auto other = count(boxOf(cells, false));
+        EXPECT_LE(other.second, kMostDispatches);
+        RecordProperty("threads of " + std::to_string(cells), std::to_string(other.first));
+        RecordProperty("dispatches of " + std::to_string(cells), other.second);
+    }
+    EXPECT_GT(alone.first, 0u);
+    EXPECT_LE(alone.second, kMostDispatches);
+}
 
 struct PublishedRun {
     std::int64_t covered = 0;
