@@ -16,9 +16,9 @@
 #include "device/device_samples.h"
 #include "gl/gl_platform.h"
 #include "graded_box.h"
+#include "job/algorithm_list.h"
 #include "mesh_files/read_mesh.h"
 #include "resample/statistic_names.h"
-#include "tessera/registry.h"
 
 namespace {
 
@@ -28,7 +28,7 @@ using nlohmann::json;
 struct Options {
     std::vector<std::string> meshPaths;
     std::vector<int> elements{100000, 1000000}, points{64, 128, 256};
-    std::vector<std::string> algorithms{"software", "compute", "hybrid", "slicing"};
+    std::string algorithms = "software,compute,hybrid,hybrid:processor,slicing,slicing:processor";
     std::string target, jsonPath;
     int runs = 5, threads = 0;
 };
@@ -91,7 +91,7 @@ std::vector<IndexBox> bricksAboutMiddle() {
 
 json timeMesh(const Options& options, const std::string& name, const TetMesh& mesh, GlThread& thread) {
     fmt::print("\n{}: {} elements\n", name, mesh.elementCount());
-    fmt::print("{:<10} {:>10} {:>9} {:>13} {:>13} {:>13} {:>13} {:>11}\n", "algorithm", "points", "bind",
+    fmt::print("{:<17} {:>10} {:>9} {:>13} {:>13} {:>13} {:>13} {:>11}\n", "algorithm", "points", "bind",
                "into blocks", "on the device", "its shaders", "processor", "uploaded");
     std::vector<int> fields;
     if (!mesh.fields.empty()) fields.push_back(0);
@@ -118,12 +118,11 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
             std::vector<Times> blocks, device;
         };
         std::vector<Row> all;
-        for (const std::string& algorithm : options.algorithms) {
-            BindOptions bind;
-            const Resampler& resampler = namedResampler(algorithm);
-            if (resampler.info().isOnDevice) bind.target = std::string(nameOf(thread.platform()));
+        BindOptions bind;
+        bind.target = std::string(nameOf(thread.platform()));
+        for (const Contestant& c : listAlgorithms(options.algorithms, bind).contestants) {
             const Timer timer;
-            all.push_back({algorithm, resampler.bind(mesh, fields, bind), 0, {}, {}});
+            all.push_back({c.label, c.resampler->bind(mesh, fields, c.options), 0, {}, {}});
             all.back().bindMs = timer.elapsedMs();
         }
         // The first compiles shaders and puts meshes on the device.
@@ -141,7 +140,7 @@ json timeMesh(const Options& options, const std::string& name, const TetMesh& me
             }
         for (const Row& row : all) {
             const json blocks = median(row.blocks), device = median(row.device);
-            fmt::print("{:<10} {:>10} {:>9.1f} {:>13.2f} {:>13.2f} {:>13.2f} {:>13.2f} {:>11.0f}\n",
+            fmt::print("{:<17} {:>10} {:>9.1f} {:>13.2f} {:>13.2f} {:>13.2f} {:>13.2f} {:>11.0f}\n",
                        row.algorithm, one.name, row.bindMs, blocks["wall_ms"].get<double>(),
                        device["wall_ms"].get<double>(), device["render_ms"].get<double>(),
                        device["processor_ms"].get<double>(), device["upload_bytes"].get<double>());
@@ -186,7 +185,8 @@ int main(int wordCount, char** words) {
     arguments.add("meshes", options.meshPaths, "mesh files");
     arguments.add("--elements", options.elements, "sizes of graded boxes");
     arguments.add("--points", options.points, "lattice points along an axis");
-    arguments.add("--algorithms", options.algorithms, "names, comma separated");
+    arguments.add("--algorithms", options.algorithms,
+                  "names with commas between them; hybrid:processor: the processor makes primitives");
     arguments.add("--runs", options.runs, "that are timed");
     arguments.add("--threads", options.threads, "of the processor; 0: all");
     arguments.add("--target", options.target, "an OpenGL platform; without, the best one");
