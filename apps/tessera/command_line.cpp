@@ -581,7 +581,7 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
     command.add_option("mesh", a.request.meshes, "mesh files")->required();
     command.add_option(
         "--algorithms", a.request.algorithms,
-        "names with commas between them, each with a target if wanted, or with who makes its primitives: "
+        "names with commas between them, each with a target if wanted, and with who makes its primitives: "
         "software,slicing:osmesa,hybrid:processor; "
         "the first is what the others are compared with (default: all that can run here)");
     addBindOptions(command, a.algorithm);

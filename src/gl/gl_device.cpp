@@ -151,11 +151,8 @@ GlDeviceInfo queryGlDevice(const GlFunctions& gl) {
     for (const char* name : kExtensionsOfInterest)
         if (std::find(present.begin(), present.end(), name) != present.end())
             info.extensions.emplace_back(name);
-    for (const char* name : {"GL_ARB_shader_viewport_layer_array", "GL_AMD_vertex_shader_layer"}) {
-        if (info.hasVertexShaderLayer) break;
-        info.hasVertexShaderLayer = std::find(present.begin(), present.end(), name) != present.end();
-        if (info.hasVertexShaderLayer) info.vertexShaderLayerExtension = name;
-    }
+    info.hasVertexShaderLayer =
+        std::find(present.begin(), present.end(), "GL_ARB_shader_viewport_layer_array") != present.end();
     info.limits = queryLimits(gl);
     for (const NamedFormat& format : kFormats) info.formats.push_back(tryFormat(gl, format));
     return info;

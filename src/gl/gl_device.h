@@ -49,9 +49,8 @@ struct GlDeviceInfo {
     std::string platformDetail;  ///< "EGL 1.5 (Mesa Project), device 1 of 1, software"
     std::string vendor, renderer, version, shadingLanguage;
     bool isSoftware = false;
-    /// gl_Layer may be written by a vertex shader; the extension that says so, else empty.
+    /// gl_Layer may be written by a vertex shader (GL_ARB_shader_viewport_layer_array).
     bool hasVertexShaderLayer = false;
-    std::string vertexShaderLayerExtension;
     GlLimits limits;
     std::vector<GlFormat> formats;        ///< r8, r16, r16f, r32f and their rg and rgba kin
     std::vector<std::string> extensions;  ///< those present among the ones Tessera could use

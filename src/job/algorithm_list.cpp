@@ -22,11 +22,15 @@ Contestant contestantOf(const std::string& entry, const BindOptions& options) {
     contestant.resampler = &findResampler(entry.substr(0, colon));
     contestant.options = bindOptionsFor(*contestant.resampler, options);
     if (colon == std::string::npos) return contestant;
-    const std::string word = entry.substr(colon + 1);
-    if (contestant.resampler->info().isOnDevice && word == nameOf(Primitives::processor)) {
-        contestant.options.primitives = Primitives::processor;
-        return contestant;
-    }
+    std::string word = entry.substr(colon + 1);
+    const std::size_t second = word.find(':');
+    const std::string last = second == std::string::npos ? word : word.substr(second + 1);
+    for (const Primitives primitives : {Primitives::device, Primitives::processor})
+        if (contestant.resampler->info().isOnDevice && last == nameOf(primitives)) {
+            contestant.options.primitives = primitives;
+            if (second == std::string::npos) return contestant;
+            word.resize(second);
+        }
     contestant.options.target = word;
     const std::vector<std::string> targets = contestant.resampler->targets();
     if (std::find(targets.begin(), targets.end(), contestant.options.target) == targets.end()) {

@@ -41,6 +41,8 @@ std::vector<PrimitiveMaker::Slab> PrimitiveMaker::slabs(const LayerCounts& layer
 
 const GlProgram& PrimitiveMaker::program(GlContext& context, const ShaderText* algorithm, std::size_t kind,
                                          bool areCounts) {
+    // Thin and easy large elements go by their nodes alike, and marks by a uniform.
+    kind = !algorithm ? 0 : isLargeKind(kind) ? 1 : kind;
     const Variant variant{algorithm ? algorithm->name : std::string_view(), kind, areCounts};
     const auto found = programs_.find(variant);
     if (found != programs_.end()) return found->second;

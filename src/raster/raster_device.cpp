@@ -53,10 +53,13 @@ RasterDevice::RasterDevice(GlThread& thread)
     : thread_(thread),
       isLayered_(thread.info().hasVertexShaderLayer),
       countsFragments_(std::ranges::count(thread.info().extensions, "GL_ARB_pipeline_statistics_query") > 0) {
-    const double most = thread.info().limits.maxPointSize;
-    if (most < kSmallExtent + 1)
-        throw GlError("the largest points of this device have " + std::to_string(int(most)) +
+    const GlLimits& limits = thread.info().limits;
+    if (limits.maxPointSize < kSmallExtent + 1)
+        throw GlError("the largest points of this device have " + std::to_string(int(limits.maxPointSize)) +
                       " pixels; sampling needs " + std::to_string(kSmallExtent + 1));
+    if (limits.subpixelBits < kSubpixelBits)
+        throw GlError("this device places corners in steps of 2^-" + std::to_string(limits.subpixelBits) +
+                      " pixel; sampling needs 2^-" + std::to_string(kSubpixelBits));
 }
 
 GLuint RasterDevice::upload(GlContext& context, Stream& stream, const void* bytes, std::size_t count) {
@@ -223,6 +226,7 @@ void RasterDevice::begin(GlContext& context, const PreparedRegion& region, const
 void RasterDevice::begin(GlContext& context, const IndexBox& points, const RasterInputs& inputs,
                          std::size_t pass, const DeviceMesh& mesh, bool scans) {
     const bool hasGeometry = prepare(context, points, inputs, pass, scans);
+    context.functions().MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);  // draws of the pass before read them
     records_.makeChannels(context, mesh, pass, inputs.format);
     isReady_ = hasGeometry;
 }
@@ -232,6 +236,7 @@ bool RasterDevice::prepare(GlContext& context, const IndexBox& points, const Ras
     // Geometry stays where the first pass put it.
     const bool hasGeometry = pass == 0 || isReady_;
     isReady_ = false;
+    isFirstPass_ = pass == 0;
     axes_ = inputs.axes;
     format_ = inputs.format;
     channels_ = inputs.recordedChannels(pass);
@@ -435,6 +440,8 @@ void RasterDevice::draw(GlContext& context, const DeviceMesh& mesh, const Shader
     if (!isReady_) return;
     const GlFunctions& gl = context.functions();
     const ScanRecords records = records_.records();
+    mostBytes =
+        std::min(mostBytes, thread_.info().limits.storageBlockBytes / 5 * 4);  // buffers have some more
     for (const PrimitiveMaker::Slab& slab : PrimitiveMaker::slabs(layers, mostBytes))
         for (std::size_t kind = 0; kind < kKinds; ++kind) {
             if (slab.counts[kind] == 0) continue;
@@ -452,7 +459,7 @@ void RasterDevice::draw(GlContext& context, const DeviceMesh& mesh, const Shader
                     drawPolygons(context, made.buffer, made.count, areThin);
                 else
                     drawSprites(context, made.buffer, made.count, areThin);
-                counts_.polygons += std::int64_t(made.count);
+                if (isFirstPass_) counts_.polygons += std::int64_t(made.count);
             }
             stopTimer(context);
         }

@@ -221,6 +221,7 @@ class RasterDevice {
     SliceAxes axes_;
     Vec3i size_{0};  ///< s, t, layers
     int channels_ = 1;
+    bool isFirstPass_ = true;
     SampleFormat format_ = SampleFormat::r32f;
     bool isReady_ = false;  ///< begin() of all passes so far came to its end; else draws, which nobody will
                             ///< see, do nothing

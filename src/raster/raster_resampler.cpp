@@ -349,8 +349,9 @@ RecordMaker::Made BoundRaster::Run::makeRecords(RegionJob& job) {
         };
         std::optional<RecordMaker::Made> made = make(budget_.recordBytes);
         if (!made && cut(job.region, 2)) continue;
-        if (!made) made = make(std::numeric_limits<std::int64_t>::max());
+        if (!made) made = make(RecordMaker::kNoBound);
         statistics_.add(counted::elementBlockPairs, near);
+        statistics_.add(counted::elementSlicePairs, made->emptyPairs);
         for (const auto& ofLayer : made->layers)
             for (const std::uint32_t count : ofLayer) statistics_.add(counted::elementSlicePairs, count);
         return *std::move(made);

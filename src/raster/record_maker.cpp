@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include "base/check.h"
@@ -20,6 +21,7 @@ constexpr std::int64_t kChunk = 16384;
 constexpr std::size_t kOperations = 8, kOperands = 4096;
 constexpr std::size_t kRunCounts = 2 * (kPartSizes + 1) + 1;
 constexpr std::size_t kLayers = std::size_t(kCellEdge) + 1;  ///< and the one behind the last
+constexpr std::size_t kEmptyCounters = 64;                   ///< so that not all threads meet at one
 
 void clear(GlContext& context, const GlBuffer& buffer, std::size_t bytes) {
     context.functions().ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, GLsizeiptr(bytes), GL_RED_INTEGER,
@@ -142,6 +144,8 @@ std::vector<ShaderDefine> recordDefines() {
             {"SLACK_FACTOR", glslOf(kSlackFactor)},
             {"CELL_EDGE", glslOf(double(kCellEdge))},
             {"LAYERS", glslOf(kLayers)},
+            {"KINDS", glslOf(kKinds)},
+            {"EMPTY_COUNTERS", glslOf(kEmptyCounters)},
             {"BOX_SLACK", glslOf(kBoxSlack)},
             {"MARGIN", glslOf(float(2 * kLargestMargin))},
             {"ROUGH_ERROR", glslOf(0x1p-16f)},
@@ -329,16 +333,31 @@ std::int64_t RecordMaker::bytesFor(std::int64_t listed, std::int64_t thin, int c
     return bytes + bytes / 4;  // buffers are made larger than is needed at once
 }
 
+std::int64_t RecordMaker::largestBuffer(std::int64_t listed, std::int64_t thin, int channels) {
+    const std::int64_t bytes =
+        std::max({listed * std::int64_t(sizeof(EasyGeometry)), thin * std::int64_t(sizeof(ThinGeometry)),
+                  listed * std::int64_t(sizeof(ChannelRecord)) * channels});
+    return bytes + bytes / 4;
+}
+
 std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, const DeviceMesh& mesh,
                                                            std::int64_t most, std::optional<int> layerAxis) {
     thinCount_ = 0;
     if (listedCount_ == 0) return Made{};
+    const int channels = mesh.passes_.front().channels;  // no pass has more
+    const auto fits = [&] {
+        const std::int64_t listed = std::int64_t(listedCount_), thin = std::int64_t(thinCount_);
+        return bytesFor(listed, thin, channels) <= most &&
+               (most == kNoBound ||
+                largestBuffer(listed, thin, channels) <= context.info().limits.storageBlockBytes);
+    };
+    if (!fits()) return std::nullopt;
     const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
     grow(context, listed_, listedCount_ * sizeof(GLuint));
     list(context, marks_, markSums_, markWords, listed_);
 
     // One more bucket than there are: before the last stand all.
-    const std::size_t counters = layerAxis ? kKinds * kLayers : 2 * kBuckets + 1;
+    const std::size_t counters = layerAxis ? kKinds * kLayers + kEmptyCounters : 2 * kBuckets + 1;
     grow(context, easyGeometry_, listedCount_ * sizeof(EasyGeometry));
     grow(context, boxes_, listedCount_ * sizeof(ScanBox));
     grow(context, thinMarks_, thinWords * sizeof(GLuint));
@@ -360,10 +379,9 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
 
     const std::size_t thinTotal = addUp(context, thinMarks_, thinWords, true, thinSums_);
     Made made;
-    const std::size_t hardCount = layerAxis ? countLayers(context, thinTotal, made.layers)
-                                            : countBuckets(context, thinTotal, made.runs);
-    const int channels = mesh.passes_.front().channels;  // no pass has more
-    if (bytesFor(std::int64_t(listedCount_), std::int64_t(thinCount_), channels) > most) return std::nullopt;
+    const std::size_t hardCount =
+        layerAxis ? countLayers(context, thinTotal, made) : countBuckets(context, thinTotal, made.runs);
+    if (!fits()) return std::nullopt;
     if (hardCount > 0) made.hard = read<std::int32_t>(context, hard_, 1, hardCount);
     std::ranges::sort(made.hard);
     makeThinGeometry(context, mesh);
@@ -395,8 +413,10 @@ std::size_t RecordMaker::countBuckets(GlContext& context, std::size_t thinTotal,
     return counts[1];
 }
 
-std::size_t RecordMaker::countLayers(GlContext& context, std::size_t thinTotal, LayerCounts& layers) {
-    const auto steps = read<GLuint>(context, boxCounts_, 0, kKinds * kLayers);
+std::size_t RecordMaker::countLayers(GlContext& context, std::size_t thinTotal, Made& made) {
+    const auto steps = read<GLuint>(context, boxCounts_, 0, kKinds * kLayers + kEmptyCounters);
+    made.emptyPairs = std::accumulate(steps.end() - kEmptyCounters, steps.end(), std::int64_t(0));
+    LayerCounts& layers = made.layers;
     layers.resize(kLayers);
     for (std::size_t kind = 0; kind < kKinds; ++kind) {
         GLuint count = 0;

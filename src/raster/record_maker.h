@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -87,12 +88,15 @@ class RecordMaker {
     struct Made {
         std::vector<ScanRun> runs;       ///< of a scan
         LayerCounts layers;              ///< of what is drawn
+        std::int64_t emptyPairs = 0;     ///< slices that an element reaches but has no point in
         std::vector<std::int32_t> hard;  ///< elements, ascending
     };
     /// The records of those elements but their channels, to be scanned or, with a layer axis, drawn. Null
-    /// when thin ones make it more bytes, with the channels, than `most`.
+    /// when they are more bytes, with the channels, than `most` or, unless that is kNoBound, than a buffer
+    /// may hold.
     std::optional<Made> makeGeometry(GlContext& context, const DeviceMesh& mesh, std::int64_t most,
                                      std::optional<int> layerAxis = {});
+    static constexpr std::int64_t kNoBound = std::numeric_limits<std::int64_t>::max();
     /// What records take when `listed` elements are listed.
     static std::int64_t bytesFor(std::int64_t listed, std::int64_t thin, int channels);
     void makeChannels(GlContext& context, const DeviceMesh& mesh, std::size_t pass, SampleFormat format);
@@ -129,7 +133,8 @@ class RecordMaker {
               const GlBuffer& listed);
     /// Both give the number of hard elements, and note that of thin ones.
     std::size_t countBuckets(GlContext& context, std::size_t thinTotal, std::vector<ScanRun>& runs);
-    std::size_t countLayers(GlContext& context, std::size_t thinTotal, LayerCounts& layers);
+    std::size_t countLayers(GlContext& context, std::size_t thinTotal, Made& made);
+    static std::int64_t largestBuffer(std::int64_t listed, std::int64_t thin, int channels);
     void makeThinGeometry(GlContext& context, const DeviceMesh& mesh);
 
     std::map<std::pair<Stage, int>, GlProgram> programs_;

@@ -113,7 +113,9 @@ bool emitGrown(std::span<const std::array<double, 2>> corners, double growth, in
 /// In voxels: corners of elements with longer edges lose too much in the rasteriser's fixed point.
 inline constexpr double kLargestPolygon = 1000;
 
-/// In pixels: more than what the rasteriser's snapping of corners can take away and an element's margin.
+/// In pixels: more than what the rasteriser's snapping of corners, to steps of 2^-kSubpixelBits, can take
+/// away and an element's margin.
+inline constexpr int kSubpixelBits = 8;
 inline constexpr double kGrowth = 0x1p-7;
 
 }  // namespace tessera

@@ -17,8 +17,8 @@ inline constexpr std::string_view contested = "contested_points";  ///< that mor
 inline constexpr std::string_view coveredPoints = "covered_points";
 inline constexpr std::string_view elementSlicePairs =
     "element_slice_pairs";  ///< slices that an element reaches, summed over elements
-inline constexpr std::string_view polygons =
-    "polygons";  ///< substitute or slice polygons, before they are grown
+inline constexpr std::string_view polygons = "polygons";    ///< substitute or slice polygons, before they are
+                                                            ///< grown; on the processor slicing's triangles
 inline constexpr std::string_view vertices = "vertices";    ///< sent to the device
 inline constexpr std::string_view fragments = "fragments";  ///< shaded, as the device counts them
 inline constexpr std::string_view uploadBytes = "upload_bytes";

@@ -1941,6 +1941,14 @@ class Compare(AppTest):
         self.assertEqual(len(ran), len(set(ran)))
         if os.environ.get("TESSERA_REQUIRE_GL"):
             self.assertEqual(report["absent"], [])
+        if "hybrid" not in ran:
+            return
+        target = report["meshes"][0]["algorithms"][ran.index("hybrid")]["target"]
+        names = ["hybrid", "hybrid:processor", "slicing:device", f"slicing:{target}:processor"]
+        by_both = self.report("compare", self.stokes, "--resolution", "24", "--runs", "2", "--algorithms", ",".join(names))
+        self.assertEqual([a["label"] for a in by_both["meshes"][0]["algorithms"]], names)
+        for against in by_both["meshes"][0]["against_first"]:
+            self.assertEqual((against["only_first"], against["only_this"], against["fields"][0]["max"]), (0, 0, 0), against["label"])
 
     def test_the_grid_covers_the_cube(self):
         report = self.report("compare", self.cube, "--algorithms", "software", "--spacing", "0.125")

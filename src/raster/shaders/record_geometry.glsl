@@ -21,7 +21,7 @@ layout(std430, binding = 7) writeonly buffer ThinSlots {
 };
 #else
 // Of each bucket that a scan sorts boxes into; with DRAWN, of each kind of elements and each layer: those that begin
-// there, less those that ended before.
+// there, less those that ended before; and behind them the layers that elements reach but have no points in.
 layout(std430, binding = 6) buffer BoxCounts {
     uint boxCounts[];
 };
@@ -78,7 +78,11 @@ void main() {
     }
     Geometry geometry = recordOf(placed, shape);
 #ifdef DRAWN
-    if (!tightenBox(geometry, low, end)) return;
+    int reached = end[layerAxis] - low[layerAxis];
+    bool mayCover = tightenBox(geometry, low, end);
+    int left = mayCover ? end[layerAxis] - low[layerAxis] : 0;
+    if (left < reached) atomicAdd(boxCounts[KINDS * LAYERS + slot % EMPTY_COUNTERS], uint(reached - left));
+    if (!mayCover) return;
 #endif
     bool isSmall = all(lessThanEqual(placed.high - placed.low, dvec3(SMALL_EXTENT)));
     uint kind = (shape.grade == kThin ? 2u : 0u) + (isSmall ? 0u : 1u);

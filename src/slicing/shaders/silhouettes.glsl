@@ -9,9 +9,9 @@ int silhouetteCorners;
 
 void begin(Placed placed) {
     vec2 node[4];
-    float extent = 0.0;
     for (int k = 0; k < 4; ++k) node[k] = vec2(placed.node[k][axes.x], placed.node[k][axes.y]);
     vec2 low = min(min(node[0], node[1]), min(node[2], node[3])), high = max(max(node[0], node[1]), max(node[2], node[3]));
+    // Where a face stands on edge its sign may be wrong: such outlines have corners too sharp to be grown.
     uint front = 0u;
     for (int j = 0; j < 4; ++j) {
         vec2 a = node[(j + 1) & 3], p = node[(j + 2) & 3] - a, q = node[(j + 3) & 3] - a;
