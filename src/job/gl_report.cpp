@@ -88,8 +88,7 @@ std::string deviceText(const GlDeviceInfo& info) {
     std::string text =
         fmt::format("  {}\n  {}, {}{}\n  OpenGL {}, GLSL {}\n", info.platformDetail, info.renderer,
                     info.vendor, info.isSoftware ? ", software" : "", info.version, info.shadingLanguage);
-    text += fmt::format("  gl_Layer in vertex shaders: {}\n",
-                        info.hasVertexShaderLayer ? "yes" : "no");
+    text += fmt::format("  gl_Layer in vertex shaders: {}\n", info.hasVertexShaderLayer ? "yes" : "no");
     std::string extensions;
     for (const std::string& name : info.extensions) extensions += " " + name;
     return text + "  extensions:" + (extensions.empty() ? " none of interest" : extensions) + "\n";
