@@ -41,7 +41,7 @@ cat "$report"
 failed=0 suites=
 # Tests of the algorithms on OpenGL; where a platform is wanted, those of it alone.
 declare -A platforms=([egl-surfaceless]=EglSurfaceless [egl-device]=EglDevice [osmesa]=Osmesa)
-for suite in contract_test contract_random_test hard_cases_test raster_records_test raster_run_test; do
+for suite in contract_test contract_random_test hard_cases_test raster_{generator,records,run}_test; do
   filter='*Slicing*:*Hybrid*:*Compute*'
   [[ $suite == raster_* ]] && filter='*'
   [[ -n $target && $suite == contract_* ]] && filter="*${platforms[$target]:?no such platform}*"

@@ -11,7 +11,7 @@ trap 'rm -rf "$stage"' EXIT
 root=$stage/tessera-portable
 mkdir -p "$root/bin" "$root/lib/own"
 cp $build/apps/tessera/{tessera,tessera_read_mesh} $build/bench/device_times \
-  $build/tests/{contract_test,contract_random_test,hard_cases_test,raster_records_test,raster_run_test} "$root/bin"
+  $build/tests/{contract_test,contract_random_test,hard_cases_test,raster_{generator,records,run}_test} "$root/bin"
 cp bench/device_report.sh "$root"
 cp -r data LICENSE "$root"
 
