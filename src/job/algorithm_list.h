@@ -15,8 +15,8 @@ struct AlgorithmList {
 };
 
 /// "software,slicing:osmesa,hybrid:processor": names, each with a target of its own, and behind it who makes
-/// its primitives, if wanted. Empty: every algorithm that
-/// meets the contract and can run here. OpenGL platform and sample format go to those that have a choice.
+/// its primitives, if wanted. Empty: every algorithm that meets the contract and can run here. OpenGL
+/// platform and sample format go to those that have a choice.
 /// Throws InputError for a name or target there isn't, or that can't run here.
 AlgorithmList listAlgorithms(const std::string& names, const BindOptions& options);
 

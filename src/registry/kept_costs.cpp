@@ -37,11 +37,14 @@ std::string driverOf(const std::string& target) {
 
 std::string costKey(const Resampler& resampler, const BindOptions& options, const Execution& execution) {
     const std::string target = options.target.empty() ? resampler.targets().front() : options.target;
-    return singleLine("tessera " TESSERA_VERSION "; " + processorName() + ", " +
-                      std::to_string(std::thread::hardware_concurrency()) + " threads, " +
-                      std::to_string(execution.threadCount()) + " used; " + resampler.name() + " " + target +
-                      " " + std::string(nameOf(options.format)) +
-                      (resampler.info().isOnDevice ? driverOf(target) : std::string()));
+    return singleLine(
+        "tessera " TESSERA_VERSION "; " + processorName() + ", " +
+        std::to_string(std::thread::hardware_concurrency()) + " threads, " +
+        std::to_string(execution.threadCount()) + " used; " + resampler.name() + " " + target + " " +
+        std::string(nameOf(options.format)) +
+        (resampler.info().isOnDevice
+             ? ", primitives by the " + std::string(nameOf(options.primitives)) + driverOf(target)
+             : std::string()));
 }
 
 std::string costsPath() {
