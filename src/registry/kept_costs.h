@@ -11,7 +11,8 @@ namespace tessera {
 using KeptCosts = std::map<std::string, CostModel>;
 
 /// What a measured cost holds for: the program's version, the processor and its threads, the algorithm, its
-/// target and format, and of OpenGL who makes primitives and the driver. Opens no driver in this process that was tried in another.
+/// target and format, and of OpenGL who makes primitives and the driver. Opens no driver in this process that
+/// was tried in another.
 std::string costKey(const Resampler& resampler, const BindOptions& options, const Execution& execution);
 
 /// "algorithm_times.json" in $XDG_CACHE_HOME/tessera or ~/.cache/tessera; empty where there is neither.
