@@ -20,6 +20,11 @@ void grow(GlContext& context, GlBuffer& buffer, std::size_t bytes) {
     buffer = GlBuffer(context, std::int64_t(bytes + bytes / 4), 0);
 }
 
+void fill(GlContext& context, const GlBuffer& buffer, std::size_t bytes, GLuint word) {
+    context.functions().ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, GLsizeiptr(bytes), GL_RED_INTEGER,
+                                                GL_UNSIGNED_INT, &word);
+}
+
 GlProgram makeComputeProgram(GlContext& context, const ShaderText& main, std::vector<ShaderText> shared,
                              std::vector<ShaderDefine> defines) {
     defines.push_back({"GROUP_THREADS", glslOf(kGroupThreads)});

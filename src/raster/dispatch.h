@@ -66,4 +66,16 @@ struct ComputeUse {
 /// Makes room for so many bytes; what stood there is lost.
 void grow(GlContext& context, GlBuffer& buffer, std::size_t bytes);
 
+/// Every word of the buffer's first bytes.
+void fill(GlContext& context, const GlBuffer& buffer, std::size_t bytes, GLuint word = 0);
+
+/// Waits for the device.
+template <class T>
+std::vector<T> readItems(GlContext& context, const GlBuffer& buffer, std::size_t first, std::size_t count) {
+    std::vector<T> items(count);
+    context.functions().GetNamedBufferSubData(buffer.id(), GLintptr(first * sizeof(T)),
+                                              GLsizeiptr(count * sizeof(T)), items.data());
+    return items;
+}
+
 }  // namespace tessera

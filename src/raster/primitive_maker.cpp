@@ -91,8 +91,7 @@ PrimitiveMaker::Made PrimitiveMaker::make(GlContext& context, RecordMaker& recor
     mark.run(words);
     records.addUp(context, marks_, words, true, sums_);
     grow(context, slots_, most * sizeof(GLuint));
-    context.functions().ClearNamedBufferSubData(slots_.id(), GL_R32UI, 0, GLsizeiptr(most * sizeof(GLuint)),
-                                                GL_RED_INTEGER, GL_UNSIGNED_INT, &kNoSlot);
+    fill(context, slots_, most * sizeof(GLuint), kNoSlot);
     records.list(context, marks_, sums_, words, slots_);
     grow(context, counts_, most * sizeof(GLuint));
     grow(context, primitives_, std::size_t(slab.counts[kind]) * bytesOf(kind));
@@ -111,10 +110,7 @@ PrimitiveMaker::Made PrimitiveMaker::make(GlContext& context, RecordMaker& recor
         making.run(most);
         if (areCounts) total = records.addUp(context, counts_, most, false, sums_);
     }
-    GLuint count = 0;
-    context.functions().GetNamedBufferSubData(sums_.id(), GLintptr(total * sizeof count), sizeof count,
-                                              &count);
-    return {primitives_.id(), count};
+    return {primitives_.id(), readItems<GLuint>(context, sums_, total, 1).front()};
 }
 
 }  // namespace tessera

@@ -489,9 +489,6 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
 
 void RasterDevice::prepareScan(GlContext& context) {
     const GlFunctions& gl = context.functions();
-    const auto clear = [&](const GlBuffer& buffer, std::int64_t bytes) {
-        gl.ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, bytes, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
-    };
     const std::int64_t points = std::int64_t(size_.x) * size_.y * size_.z;
     if (!owners_ || !orders_ || owners_.bytes() < points * kOwnerBytes) {
         areOwnersClear_ = false;  // there may be room for one of them only
@@ -511,8 +508,8 @@ void RasterDevice::prepareScan(GlContext& context) {
     constexpr GLuint kNoParts[2][4] = {{0, 1, 1, 0}, {0, 1, 1, 0}};
     if (!partCounts_) partCounts_ = GlBuffer(context, sizeof kNoParts, GL_DYNAMIC_STORAGE_BIT);
     gl.NamedBufferSubData(partCounts_.id(), 0, sizeof kNoParts, kNoParts);
-    if (!areOwnersClear_) clear(owners_, owners_.bytes());
-    clear(contenders_, kContenderBytes);
+    if (!areOwnersClear_) fill(context, owners_, std::size_t(owners_.bytes()));
+    fill(context, contenders_, std::size_t(kContenderBytes));
     areOwnersClear_ = false;
 }
 

@@ -23,19 +23,6 @@ constexpr std::size_t kRunCounts = 2 * (kPartSizes + 1) + 1;
 constexpr std::size_t kLayers = std::size_t(kCellEdge) + 1;  ///< and the one behind the last
 constexpr std::size_t kEmptyCounters = 64;                   ///< so that not all threads meet at one
 
-void clear(GlContext& context, const GlBuffer& buffer, std::size_t bytes) {
-    context.functions().ClearNamedBufferSubData(buffer.id(), GL_R32UI, 0, GLsizeiptr(bytes), GL_RED_INTEGER,
-                                                GL_UNSIGNED_INT, nullptr);
-}
-
-template <class T>
-std::vector<T> read(GlContext& context, const GlBuffer& buffer, std::size_t first, std::size_t count) {
-    std::vector<T> items(count);
-    context.functions().GetNamedBufferSubData(buffer.id(), GLintptr(first * sizeof(T)),
-                                              GLsizeiptr(count * sizeof(T)), items.data());
-    return items;
-}
-
 /// As shaders compute them.
 void operate(double a, double b, double (&results)[kOperations]) {
     const double made[kOperations] = {
@@ -228,7 +215,7 @@ bool RecordMaker::isExact(GlContext& context) {
     test.bind(1, results);
     test.set("count", kOperands);
     test.run(kOperands);
-    const auto made = read<double>(context, results, 0, kOperands * kOperations);
+    const auto made = readItems<double>(context, results, 0, kOperands * kOperations);
     isExact_ = true;
     for (std::size_t i = 0; i < kOperands; ++i) {
         double expected[kOperations];
@@ -306,7 +293,7 @@ std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, c
     listedCount_ = 0;
     if (words == 0) return 0;
     grow(context, marks_, words * sizeof(GLuint));
-    clear(context, marks_, words * sizeof(GLuint));
+    fill(context, marks_, words * sizeof(GLuint));
     const ComputeUse near = use(context, Stage::near);
     near.bind(0, mesh.tets_);
     near.bind(1, rough_);
@@ -320,7 +307,7 @@ std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, c
     setPlace("highest", points.max - 1);
     near.run(mesh.elementCount_);
     const std::size_t total = addUp(context, marks_, words, true, markSums_);
-    listedCount_ = read<GLuint>(context, markSums_, total, 1).front();
+    listedCount_ = readItems<GLuint>(context, markSums_, total, 1).front();
     TESSERA_CHECK(listedCount_ < std::size_t(1) << kRankKindShift, "ranks hold the records");
     return std::int64_t(listedCount_);
 }
@@ -363,9 +350,9 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
     grow(context, thinMarks_, thinWords * sizeof(GLuint));
     grow(context, boxCounts_, counters * sizeof(GLuint));
     grow(context, hard_, (listedCount_ + 1) * sizeof(GLuint));
-    clear(context, thinMarks_, thinWords * sizeof(GLuint));
-    clear(context, boxCounts_, counters * sizeof(GLuint));
-    clear(context, hard_, sizeof(GLuint));
+    fill(context, thinMarks_, thinWords * sizeof(GLuint));
+    fill(context, boxCounts_, counters * sizeof(GLuint));
+    fill(context, hard_, sizeof(GLuint));
     ComputeUse easy = use(context, layerAxis ? Stage::drawnGeometry : Stage::easyGeometry);
     usePlaced(easy, mesh);
     easy.bind(2, listed_);
@@ -382,7 +369,7 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
     const std::size_t hardCount =
         layerAxis ? countLayers(context, thinTotal, made) : countBuckets(context, thinTotal, made.runs);
     if (!fits()) return std::nullopt;
-    if (hardCount > 0) made.hard = read<std::int32_t>(context, hard_, 1, hardCount);
+    if (hardCount > 0) made.hard = readItems<std::int32_t>(context, hard_, 1, hardCount);
     std::ranges::sort(made.hard);
     makeThinGeometry(context, mesh);
     if (layerAxis) return made;
@@ -407,14 +394,14 @@ std::size_t RecordMaker::countBuckets(GlContext& context, std::size_t thinTotal,
     count.bind(3, counts_);
     count.set("thinTotal", thinTotal);
     count.run(kRunCounts);
-    const auto counts = read<GLuint>(context, counts_, 0, kRunCounts + 2);
+    const auto counts = readItems<GLuint>(context, counts_, 0, kRunCounts + 2);
     thinCount_ = counts[0];
     runs = listScanRuns(std::span(counts).subspan<2, kRunCounts>());
     return counts[1];
 }
 
 std::size_t RecordMaker::countLayers(GlContext& context, std::size_t thinTotal, Made& made) {
-    const auto steps = read<GLuint>(context, boxCounts_, 0, kKinds * kLayers + kEmptyCounters);
+    const auto steps = readItems<GLuint>(context, boxCounts_, 0, kKinds * kLayers + kEmptyCounters);
     made.emptyPairs = std::accumulate(steps.end() - kEmptyCounters, steps.end(), std::int64_t(0));
     LayerCounts& layers = made.layers;
     layers.resize(kLayers);
@@ -423,8 +410,8 @@ std::size_t RecordMaker::countLayers(GlContext& context, std::size_t thinTotal, 
         for (std::size_t layer = 0; layer < kLayers; ++layer)
             layers[layer][kind] = count += steps[kind * kLayers + layer];
     }
-    thinCount_ = read<GLuint>(context, thinSums_, thinTotal, 1).front();
-    return read<GLuint>(context, hard_, 0, 1).front();
+    thinCount_ = readItems<GLuint>(context, thinSums_, thinTotal, 1).front();
+    return readItems<GLuint>(context, hard_, 0, 1).front();
 }
 
 void RecordMaker::makeThinGeometry(GlContext& context, const DeviceMesh& mesh) {
@@ -474,11 +461,11 @@ ScanRecords RecordMaker::records() const {
 }
 
 std::vector<std::int32_t> RecordMaker::listed(GlContext& context) const {
-    return read<std::int32_t>(context, listed_, 0, listedCount_);
+    return readItems<std::int32_t>(context, listed_, 0, listedCount_);
 }
 
 std::vector<ScanBox> RecordMaker::boxes(GlContext& context) const {
-    return read<ScanBox>(context, boxes_, 0, listedCount_);
+    return readItems<ScanBox>(context, boxes_, 0, listedCount_);
 }
 
 }  // namespace tessera
