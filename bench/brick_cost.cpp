@@ -20,7 +20,7 @@
 #include "arguments.h"
 #include "base/timer.h"
 #include "bench_statistics.h"
-#include "graded_box.h"
+#include "benchmark/graded_box.h"
 #include "mesh/element_index.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/fields.h"
@@ -38,7 +38,7 @@ using tessera::Box3d;
 using tessera::TetMesh;
 using tessera::Vec3d;
 using tessera::Vec3i;
-using tessera::bench::gradedBox;
+using tessera::gradedBox;
 
 struct Options {
     std::vector<std::string> meshPaths;

@@ -15,7 +15,7 @@
 #include "bench_statistics.h"
 #include "device/device_samples.h"
 #include "gl/gl_platform.h"
-#include "graded_box.h"
+#include "benchmark/graded_box.h"
 #include "job/algorithm_list.h"
 #include "mesh_files/read_mesh.h"
 #include "resample/statistic_names.h"
@@ -170,7 +170,7 @@ int run(const Options& options) {
                 {"meshes", json::array()}};
     for (const int elements : options.elements)
         report["meshes"].push_back(
-            timeMesh(options, "graded box", tessera::bench::gradedBox(elements), thread));
+            timeMesh(options, "graded box", tessera::gradedBox(elements), thread));
     for (const std::string& path : options.meshPaths)
         report["meshes"].push_back(timeMesh(options, path, readMesh(path, {}, {}).mesh, thread));
     tessera::bench::writeText(options.jsonPath, report.dump(1) + "\n");

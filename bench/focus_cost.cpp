@@ -20,7 +20,7 @@
 
 #include "arguments.h"
 #include "base/timer.h"
-#include "graded_box.h"
+#include "benchmark/graded_box.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/random.h"
 #include "refine/plan.h"

@@ -16,11 +16,7 @@
 // sampling and the extension, and of drawing.
 
 #include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -29,27 +25,18 @@
 
 #include "accuracy_plot.h"
 #include "arguments.h"
-#include "job/mesh_source.h"
+#include "benchmark/picture_errors.h"
 #include "job/scene_picture.h"
-#include "job/vdb_source.h"
 #include "mesh_files/read_mesh.h"
-#include "reference/mesh_cast.h"
-#include "reference/ray_cast.h"
 #include "refine/plan.h"
 #include "schedule/schedule_bricks.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
-#include "vdb/shape_output.h"
-#include "vdb/vdb_write.h"
 
 namespace {
 
 using namespace tessera;
 
-/// Pixels around a silhouette that count as beside it.
-constexpr int kBeside = 4;
-/// Of rays that are cut with the mesh.
-constexpr double kStepVoxels = 0.25;
 /// A share of the range that no budget here reaches.
 constexpr double kLeastError = 1e-4;
 
@@ -60,55 +47,13 @@ struct Options {
     int size = 512, brickCells = 16, threads = 2;
 };
 
-/// How many pixels see the mesh, and which of them aren't beside a silhouette.
-struct Seen {
-    std::vector<bool> inside;
-    std::int64_t meshCount = 0, insideCount = 0;
-};
-
-Seen seenBy(const MeshRays& rays) {
-    const int width = rays.camera().widthPixels, height = rays.camera().heightPixels;
-    Seen seen;
-    const auto partsAt = [&](int x, int y) { return rays.spans(x, y).size(); };
-    for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-            bool isInside = partsAt(x, y) > 0;
-            seen.meshCount += isInside;
-            for (int j = std::max(0, y - kBeside); j <= std::min(height - 1, y + kBeside) && isInside; ++j)
-                for (int i = std::max(0, x - kBeside); i <= std::min(width - 1, x + kBeside); ++i)
-                    isInside = isInside && partsAt(i, j) == partsAt(x, y);
-            seen.insideCount += isInside;
-            seen.inside.push_back(isInside);
-        }
-    return seen;
-}
-
-/// In steps of 1/255.
-struct Differences {
-    double all = 0, inside = 0;
-};
-
-Differences differencesOf(const RgbaImage& image, const RgbaImage& exact, const Seen& seen) {
-    double all = 0, inside = 0;
-    for (std::size_t p = 0; p < image.pixels.size(); ++p)
-        for (std::size_t c = 0; c < 3; ++c) {
-            const double apart = 255 * (double(image.pixels[p][c]) - double(exact.pixels[p][c]));
-            all += apart * apart;
-            if (seen.inside[p]) inside += apart * apart;
-        }
-    const auto root = [](double sum, std::int64_t pixels) {
-        return std::sqrt(sum / (3 * double(std::max<std::int64_t>(pixels, 1))));
-    };
-    return {root(all, seen.meshCount), root(inside, seen.insideCount)};
-}
-
 /// What came of one budget.
 struct Row {
     const char* criterion = "";
     std::int64_t budget = 0, voxels = 0;
     int levels = 0;
     double largestError = 0, resampleMs = 0, drawMs = 0;
-    Differences drawn, clipped, values;
+    PictureErrors errors;
 };
 
 constexpr const char* kCsvHeading =
@@ -118,8 +63,8 @@ constexpr const char* kCsvHeading =
 std::string csvText(const Row& row) {
     return fmt::format("{},{},{},{},{:.5g},{:.0f},{:.0f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n",
                        row.criterion, row.budget, row.voxels, row.levels, row.largestError, row.resampleMs,
-                       row.drawMs, row.drawn.all, row.drawn.inside, row.clipped.all, row.clipped.inside,
-                       row.values.all, row.values.inside);
+                       row.drawMs, row.errors.drawn.all, row.errors.drawn.inside, row.errors.clipped.all,
+                       row.errors.clipped.inside, row.errors.values.all, row.errors.values.inside);
 }
 
 constexpr const char* kTableHeading =
@@ -140,68 +85,14 @@ std::string tableText(const std::string& name, const Row& row) {
     return fmt::format(
         "| {} | {} | {:.3g} M | {} | {:.2g} s | {:.2g} s | {:.2f} | {:.2f} | {:.2f} | {:.3f} |\n", name,
         row.criterion, 1e-6 * double(row.voxels), row.levels, 1e-3 * row.resampleMs, 1e-3 * row.drawMs,
-        row.drawn.all, row.drawn.inside, row.clipped.all, row.values.all);
+        row.errors.drawn.all, row.errors.drawn.inside, row.errors.clipped.all, row.errors.values.all);
 }
 
-class Bench {
-  public:
-    Bench(const Options& options, const TetMesh& mesh, const std::string& field)
-        : options_(options),
-          execution_{.threads = options.threads},
-          scene_(sceneOf(options, field)),
-          source_(mesh, scene_, 0, thread(), execution_),
-          picture_(pictureOf(scene_, source_, false).options),
-          nearest_(source_.mesh(), options.threads),
-          rays_(source_.mesh(), picture_.camera, execution_),
-          seen_(seenBy(rays_)),
-          renderer_(thread()) {
-        const Timer timer;
-        exact_ = castMesh(source_.mesh(), picture_.camera,
-                          {.function = picture_.function, .layerWorld = picture_.layerWorld}, execution_);
-        exactMs_ = timer.elapsedMs();
-        keep("exact", exact_);
-    }
-
-    const std::string& title() const { return source_.title(); }
-    double exactMs() const { return exactMs_; }
-    const Seen& seen() const { return seen_; }
-
-    Row measure(Criterion criterion, std::int64_t budget);
-
-  private:
-    static GlThread& thread() { return sharedGlThread(chooseGlPlatform({})); }
-    static Scene sceneOf(const Options& options, const std::string& field) {
-        Scene scene;
-        scene.field = field;
-        scene.width = scene.height = options.size;
-        scene.samplesAPixel = 1;
-        scene.hasLegend = false;
-        return scene;
-    }
-    RefineOptions refineBy(Criterion criterion, std::int64_t budget) const;
-    void keep(const std::string& name, const RgbaImage& image) const {
-        if (options_.picturesPath.empty()) return;
-        writePng(options_.picturesPath + "/" + title() + "_" + name + ".png",
-                 overGround(image, scene_.ground));
-    }
-
-    const Options& options_;
-    Execution execution_;
-    Scene scene_;
-    MeshSource source_;  // for its mesh and what is chosen by it; nothing is sampled
-    RenderOptions picture_;
-    NearestOnDemand nearest_;
-    MeshRays rays_;
-    Seen seen_;
-    SliceRenderer renderer_;
-    RgbaImage exact_;
-    double exactMs_ = 0;
-};
-
-RefineOptions Bench::refineBy(Criterion criterion, std::int64_t budget) const {
+RefineOptions refineBy(const Options& options, const TetMesh& mesh, Criterion criterion, std::int64_t budget,
+                       const Execution& execution) {
     RefineOptions refine;
     refine.criterion = criterion;
-    refine.brickCells = options_.brickCells;
+    refine.brickCells = options.brickCells;
     refine.maxVoxels = budget;
     if (criterion == Criterion::error) {
         refine.maxError = kLeastError;
@@ -212,69 +103,32 @@ RefineOptions Bench::refineBy(Criterion criterion, std::int64_t budget) const {
     refine.maxVoxels = std::int64_t(1) << 40;
     while (fits + 1 < tooFine) {
         refine.resolution = (fits + tooFine) / 2;
-        const BrickTree tree = planBricks(source_.mesh(), refine, execution_);
+        const BrickTree tree = planBricks(mesh, refine, execution);
         (std::int64_t(tree.leafCount()) * brick <= budget ? fits : tooFine) = refine.resolution;
     }
     refine.resolution = fits;
     return refine;
 }
 
-Row Bench::measure(Criterion criterion, std::int64_t budget) {
-    const TetMesh& mesh = source_.mesh();
+Row measure(const Options& options, const PictureReference& reference, Criterion criterion,
+            std::int64_t budget, const Execution& execution) {
+    const TetMesh& mesh = reference.mesh();
     const std::vector<int> fields{0};
     const Resampler& resampler = findResampler("software");
-    const RefineOptions refine = refineBy(criterion, budget);
+    const RefineOptions refine = refineBy(options, mesh, criterion, budget, execution);
     Row row;
     row.criterion = criterion == Criterion::error ? "by error" : "uniform";
     row.budget = budget;
-    BrickResult result = makeBricks(mesh, fields, resampler, refine, execution_);
+    BrickResult result = makeBricks(mesh, fields, resampler, refine, execution);
     row.voxels =
         std::int64_t(result.tree.leafCount()) * refine.brickCells * refine.brickCells * refine.brickCells;
     row.levels = result.tree.levelCount();
     row.largestError = result.report.fields[0].relativeMax;
-    const Timer timer;
-    const Field& field = mesh.fields[0];
-    const std::vector<OutputField> outputs{
-        {"f", field.name, field.location == FieldLocation::cell ? "cell" : "point", 1, 0}};
-    OutputShape shape;
-    shape.layers = 1;
-    shapeForFile(mesh, fields, outputs, resampler, refine.bind, shape, result, execution_);
-    row.resampleMs = result.times.planMs + result.times.resampleMs + timer.elapsedMs();
-    const RayCaster caster(result.tree, {mesh, fields, result.tree, result.store, nearest_}, 0, execution_);
-    row.values =
-        differencesOf(caster.draw(rays_, picture_.function,
-                                  {.layerWorld = picture_.layerWorld, .stepVoxels = kStepVoxels}, execution_),
-                      exact_, seen_);
-
-    const auto path = std::filesystem::temp_directory_path() /
-                      fmt::format("picture_accuracy_{}.vdb", static_cast<long long>(getpid()));
-    VdbWriteOptions write;
-    write.layers = shape.layers;
-    writeVdb(path.string(), outputs, result, write, execution_);
-    Job job;
-    job.execution = execution_;
-    const auto source = openVdbSource(path.string(), "", {}, thread(), job);
-    std::filesystem::remove(path);
-
-    const auto draw = [&](const RenderOptions& options) {
-        RenderCounts counts;
-        RgbaImage image = renderer_.draw(source->pool(), *source->pool().state(), source->frame(),
-                                         source->bricks(), options, execution_, &counts);
-        row.drawMs = counts.drawMs;
-        return image;
-    };
-    RenderOptions clipped = picture_;
-    const Box3d& bounds = source_.boundsWorld();
-    for (int a = 0; a < 3; ++a) {
-        Vec3d axis(0);
-        axis[a] = 1;
-        clipped.within.push_back({axis, bounds.min[a]});
-        clipped.within.push_back({-axis, -bounds.max[a]});
-    }
-    row.clipped = differencesOf(draw(clipped), exact_, seen_);
-    const RgbaImage drawn = draw(picture_);  // the second time: shaders are made
-    row.drawn = differencesOf(drawn, exact_, seen_);
-    keep(fmt::format("{}_{}", criterion == Criterion::error ? "error" : "uniform", budget), drawn);
+    row.errors = reference.measure(
+        resampler, refine, result,
+        fmt::format("{}_{}", criterion == Criterion::error ? "error" : "uniform", budget), execution);
+    row.resampleMs = result.times.planMs + result.times.resampleMs + row.errors.extendMs;
+    row.drawMs = row.errors.drawMs;
     return row;
 }
 
@@ -294,23 +148,32 @@ void run(const Options& options) {
         const std::size_t colon = word.rfind(':');
         const std::string path = word.substr(0, colon);
         const std::string field = colon == std::string::npos ? "" : word.substr(colon + 1);
-        Bench bench(options, readMesh(path, {}, {.threads = options.threads}).mesh, field);
+        const Execution execution{.threads = options.threads};
+        PictureReference::Keep keep;
+        if (!options.picturesPath.empty())
+            keep = [&](const std::string& name, const RgbaImage& image) {
+                writePng(options.picturesPath + "/" + field + "_" + name + ".png",
+                         overGround(image, Scene().ground));
+            };
+        const PictureReference reference(readMesh(path, {}, execution).mesh, field, options.size, execution,
+                                         keep);
         const std::string file = std::filesystem::path(path).filename().string();
-        const std::string name = file + ", " + bench.title();
+        const std::string name = file + ", " + reference.title();
         notes +=
             fmt::format("{}: the exact picture took {:.2g} s; {} pixels see the mesh, {} of them inside\n",
-                        name, 1e-3 * bench.exactMs(), bench.seen().meshCount, bench.seen().insideCount);
+                        name, 1e-3 * reference.exactMs(), reference.pixelsOfMesh(), reference.pixelsInside());
         bench::AccuracyPanel& panel = panels.emplace_back();
         panel.title = name;
         for (const Criterion criterion : {Criterion::error, Criterion::uniform}) {
             bench::AccuracyLine drawn, values;
             for (const std::int64_t budget : options.budgets) {
-                const Row row = bench.measure(criterion, budget);
+                const Row row = measure(options, reference, criterion, budget, execution);
                 fmt::print("{}", tableText(inTable(name), row));
                 std::fflush(stdout);
-                if (csv.is_open()) csv << file << ',' << bench.title() << ',' << csvText(row) << std::flush;
-                drawn.points.push_back({double(row.voxels), row.drawn.all});
-                values.points.push_back({double(row.voxels), row.values.all});
+                if (csv.is_open())
+                    csv << file << ',' << reference.title() << ',' << csvText(row) << std::flush;
+                drawn.points.push_back({double(row.voxels), row.errors.drawn.all});
+                values.points.push_back({double(row.voxels), row.errors.values.all});
             }
             const bool isByError = criterion == Criterion::error;
             drawn.label = isByError ? "by error" : "uniform";

@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "arguments.h"
-#include "graded_box.h"
+#include "benchmark/graded_box.h"
 #include "mesh/field_range.h"
 #include "mesh_files/read_mesh.h"
 #include "reference/ray_cast.h"

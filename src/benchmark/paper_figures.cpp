@@ -1,4 +1,4 @@
-#include "job/paper_figures.h"
+#include "benchmark/paper_figures.h"
 
 namespace tessera {
 

@@ -7,7 +7,7 @@
 #include "reference/generators.h"
 #include "tessera/mesh.h"
 
-namespace tessera::bench {
+namespace tessera {
 
 /// A jittered box whose cells grow from a corner: sizes differ tenfold along each axis.
 inline TetMesh gradedBox(std::int64_t elements) {
@@ -21,4 +21,4 @@ inline TetMesh gradedBox(std::int64_t elements) {
     return mesh;
 }
 
-}  // namespace tessera::bench
+}  // namespace tessera

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tessera/resampler.h"
+
+namespace tessera {
+
+/// A program that samples meshes: what it is called in the report, and the command that starts it
+/// (docs/benchmark_peers.md).
+struct PeerCommand {
+    std::string name, command;
+};
+
+/// What `tessera bench` is asked for.
+struct BenchmarkRequest {
+    std::string mesh, folder;  ///< folder: where the report goes; made when it isn't there
+    std::string field;         ///< empty: the first scalar field of the points
+    std::string algorithms;    ///< as listAlgorithms() takes them; empty: all there are, all their ways
+    BindOptions bind;          ///< platform of those on a device
+    std::vector<PeerCommand> peers;
+    bool hasVtk = true;             ///< VTK is a peer, where its program stands beside this one
+    bool isQuick = false;           ///< few cases, a minute in all
+    std::vector<int> resolutions;   ///< points along the longest axis; empty: some that suit
+    std::optional<int> rounds;      ///< not given: 9, or 6 where it is to be quick
+    std::optional<double> seconds;  ///< for all rounds; not given: 420, or 24 where it is to be quick
+    std::uint64_t seed = 1;         ///< of orders and places
+    std::string comparedWith;       ///< the report.json of an earlier run; empty: none
+    std::string program;  ///< tessera itself, which samples in processes of its own for their memory
+};
+
+}  // namespace tessera

@@ -1,0 +1,165 @@
+#include "benchmark/timed_cases.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <numeric>
+#include <random>
+#include <thread>
+
+#include "base/timer.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+constexpr int kFewestRounds = 6;  // a 95 % interval needs so many values
+constexpr double kPatience = 3;   // times the longest run: then a first one is ended
+/// Time grows by about this power of the work; less, so that nothing is left out by mistake.
+constexpr double kGrowth = 0.75;
+
+double processorMs() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto ms = [](const timeval& t) { return double(t.tv_sec) * 1e3 + double(t.tv_usec) * 1e-3; };
+    return ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+/// Work that is cancelled when it takes too long, or when the caller's is.
+class TimeLimit {
+  public:
+    TimeLimit(const Execution& outer, double limitMs) : inner_(outer) {
+        inner_.cancel = &over_;
+        inner_.progress = nullptr;
+        watch_ = std::thread([this, limitMs, cancel = outer.cancel] {
+            const Timer timer;
+            std::unique_lock lock(mutex_);
+            while (!done_ && timer.elapsedMs() < limitMs && !(cancel && *cancel))
+                wake_.wait_for(lock, std::chrono::milliseconds(20));
+            over_ = !done_;
+        });
+    }
+    ~TimeLimit() {
+        {
+            const std::lock_guard lock(mutex_);
+            done_ = true;
+        }
+        wake_.notify_one();
+        watch_.join();
+    }
+    TimeLimit(const TimeLimit&) = delete;
+    TimeLimit& operator=(const TimeLimit&) = delete;
+    const Execution& execution() const { return inner_; }
+
+  private:
+    Execution inner_;
+    std::atomic<bool> over_{false};
+    std::mutex mutex_;
+    std::condition_variable wake_;
+    bool done_ = false;
+    std::thread watch_;
+};
+
+/// What the last rung of a ladder took.
+struct Rung {
+    double ms = 0, work = 0;
+    bool isLeftOut = false;
+};
+
+void runFirst(TimedCase& one, Rung& rung, const RoundOptions& options, const Execution& execution) {
+    const double expected =
+        rung.work > 0 ? rung.ms * std::pow(std::max(1.0, one.work / rung.work), kGrowth) : 0;
+    if (rung.isLeftOut || expected > options.longestRunMs) {
+        one.leftOut =
+            fmt::format("{}: a run would take more than {:g} s", one.what, options.longestRunMs / 1000);
+        return;
+    }
+    try {
+        const TimeLimit limit(execution, kPatience * options.longestRunMs);
+        if (one.prepare) one.prepare(limit.execution());
+        one.firstMs = one.run(limit.execution()).ms;
+        if (one.firstMs > options.longestRunMs)
+            one.leftOut = fmt::format("{}: a run takes {:.3g} s", one.what, one.firstMs / 1000);
+    } catch (const Cancelled&) {
+        execution.throwIfCancelled();
+        one.leftOut = fmt::format("{}: a run takes more than {:g} s", one.what,
+                                  kPatience * options.longestRunMs / 1000);
+    } catch (const InputError& error) {
+        one.leftOut = fmt::format("{}: {}", one.what, error.what());
+    } catch (const GlError& error) {
+        one.leftOut = fmt::format("{}: {}", one.what, error.what());
+    } catch (const IoError& error) {
+        one.leftOut = fmt::format("{}: {}", one.what, error.what());
+    }
+    rung = {one.firstMs, one.work, !one.leftOut.empty()};
+}
+
+}  // namespace
+
+MedianInterval TimedCase::interval() const {
+    std::vector<double> ms;
+    for (const CaseSample& sample : samples) ms.push_back(sample.ms);
+    return medianInterval(std::move(ms));
+}
+
+double TimedCase::medianOf(const std::function<double(const CaseSample&)>& figure) const {
+    std::vector<double> values;
+    for (const CaseSample& sample : samples) values.push_back(figure(sample));
+    return medianInterval(std::move(values)).median;
+}
+
+int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Execution& execution,
+              const std::function<void(const std::string&)>& say) {
+    std::map<std::string, Rung> rungs;
+    const auto count = std::int64_t(cases.size());
+    double roundMs = 0;
+    std::vector<TimedCase*> timedOnes;
+    for (std::int64_t i = 0; i < count; ++i) {
+        TimedCase& one = cases[std::size_t(i)];
+        execution.report(Stage::planning, i, count);
+        runFirst(one, rungs[one.ladder], options, execution);
+        if (!one.leftOut.empty()) continue;
+        timedOnes.push_back(&one);
+        roundMs += one.firstMs;
+    }
+    // First runs are slower than later ones, so there is time for what is left.
+    const int rounds = std::min(options.rounds, std::max(kFewestRounds, int(options.longestMs / roundMs)));
+    say(fmt::format("{} cases in {} rounds of about {:.2g} s\n", timedOnes.size(), rounds, roundMs / 1000));
+    std::mt19937_64 random(options.seed);
+    const auto runs = std::int64_t(timedOnes.size()) * rounds;
+    for (std::int64_t run = 0; run < runs; ++run) {
+        const std::size_t place = std::size_t(run) % timedOnes.size();
+        if (place == 0) std::shuffle(timedOnes.begin(), timedOnes.end(), random);
+        execution.report(Stage::sampling, run, runs);
+        TimedCase& one = *timedOnes[place];
+        one.samples.push_back(one.run(execution.withoutProgress()));
+    }
+    return rounds;
+}
+
+MedianInterval ratioOf(const TimedCase& first, const TimedCase& second) {
+    std::vector<double> ratios;
+    for (std::size_t i = 0; i < std::min(first.samples.size(), second.samples.size()); ++i)
+        ratios.push_back(second.samples[i].ms / first.samples[i].ms);
+    return medianInterval(std::move(ratios));
+}
+
+CaseSample timed(const std::function<ResampleStatistics()>& work) {
+    CaseSample sample;
+    const double before = processorMs();
+    const Timer timer;
+    sample.statistics = work();
+    sample.ms = timer.elapsedMs();
+    sample.processorMs = processorMs() - before;
+    return sample;
+}
+
+}  // namespace tessera
