@@ -101,7 +101,8 @@ class SpawnPlan {
         error |= posix_spawn_file_actions_addclosefrom_np(&actions_, next + 1);
         const sigset_t blocked = maskOfChild();
         error |= posix_spawnattr_setsigmask(&attributes_, &blocked);
-        error |= posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
+        const int group = start.hasOwnGroup ? POSIX_SPAWN_SETPGROUP : 0;
+        error |= posix_spawnattr_setflags(&attributes_, short(POSIX_SPAWN_SETSIGMASK | group));
         if (error != 0) failToStart(start.task, "preparation", ENOMEM);
     }
     void release() {
@@ -160,11 +161,12 @@ void Descriptor::close() {
     number_ = -1;
 }
 
-ChildProcess::ChildProcess(const ChildStart& start) : child_(SpawnPlan(start).spawn(start)) {}
+ChildProcess::ChildProcess(const ChildStart& start)
+    : child_(SpawnPlan(start).spawn(start)), hasOwnGroup_(start.hasOwnGroup) {}
 
 void ChildProcess::kill() {
     if (child_ < 0) return;
-    ::kill(child_, SIGKILL);
+    ::kill(hasOwnGroup_ ? -child_ : child_, SIGKILL);
     // One that hangs in the kernel, in a broken graphics driver say, doesn't end: it isn't waited for.
     reapSoon();
     child_ = -1;

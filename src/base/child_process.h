@@ -42,6 +42,7 @@ struct ChildStart {
     std::vector<std::string> arguments;
     std::vector<int> descriptors;  ///< of this process; they become 3, 4, ... of the child
     std::string variable;          ///< "NAME=value" for an environment without NAME, or empty
+    bool hasOwnGroup = false;      ///< what it starts in its turn is killed with it
 };
 
 /// A running child with nothing but the descriptors it is given; its standard streams lead nowhere, and it
@@ -51,7 +52,9 @@ class ChildProcess {
     /// Throws IoError when the program can't be started.
     explicit ChildProcess(const ChildStart& start);
     ~ChildProcess() { kill(); }
-    ChildProcess(ChildProcess&& other) noexcept : child_(other.child_) { other.child_ = -1; }
+    ChildProcess(ChildProcess&& other) noexcept : child_(other.child_), hasOwnGroup_(other.hasOwnGroup_) {
+        other.child_ = -1;
+    }
     ChildProcess& operator=(ChildProcess&&) = delete;
 
     /// Processor time that the child has taken so far, of all its threads; 0 when it has ended.
@@ -66,6 +69,7 @@ class ChildProcess {
     std::optional<ProcessEnd> reapSoon();
 
     pid_t child_ = -1;
+    bool hasOwnGroup_ = false;
 };
 
 /// To be called first by such a child: ends this process with its parent, and leaves no core file.

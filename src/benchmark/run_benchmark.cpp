@@ -1,0 +1,502 @@
+#include "benchmark/run_benchmark.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <filesystem>
+#include <set>
+
+#include "base/timer.h"
+#include "benchmark/analyse_runs.h"
+#include "benchmark/benchmark_page.h"
+#include "benchmark/benchmark_text.h"
+#include "benchmark/benchmark_variants.h"
+#include "benchmark/brick_cases.h"
+#include "benchmark/compare_benchmarks.h"
+#include "benchmark/graded_box.h"
+#include "benchmark/machine_rates.h"
+#include "benchmark/machine_text.h"
+#include "benchmark/oracle_errors.h"
+#include "benchmark/paper_cases.h"
+#include "benchmark/picture_errors.h"
+#include "benchmark/program_memory.h"
+#include "benchmark/warm_cases.h"
+#include "files/atomic_file.h"
+#include "job/import_mesh.h"
+#include "job/output_paths.h"
+#include "job/report_text.h"
+#include "tessera/error.h"
+
+namespace tessera {
+
+namespace {
+
+/// How much is done.
+struct Extent {
+    std::vector<int> resolutions, focusPoints, warmPoints, elements;
+    std::vector<double> bounds, elementSamples;
+    int variationPoints = 0, mostRounds = 0, paperPoints = 0, elementsPoints = 0, pictureSize = 0,
+        places = 0, lattices = 0;
+    double seconds = 0, longestRunMs = 0;
+};
+
+Extent extentOf(const BenchmarkRequest& request) {
+    Extent extent;
+    if (request.isQuick)
+        extent = {.resolutions = {24, 48, 96},
+                  .focusPoints = {96},
+                  .warmPoints = {64},
+                  .elements = {2000, 10000, 50000},
+                  .bounds = {0.1, 0.05},
+                  .elementSamples = {1},
+                  .variationPoints = 48,
+                  .mostRounds = 6,
+                  .paperPoints = 128,
+                  .elementsPoints = 48,
+                  .pictureSize = 192,
+                  .places = 1000,
+                  .lattices = 2,
+                  .seconds = 24,
+                  .longestRunMs = 300};
+    else
+        extent = {.resolutions = {32, 64, 128, 256},
+                  .focusPoints = {128, 256, 512},
+                  .warmPoints = {64, 128, 256},
+                  .elements = {10000, 30000, 100000, 300000, 1000000},
+                  .bounds = {0.1, 0.05, 0.02, 0.01},
+                  .elementSamples = {1, 2, 4},
+                  .variationPoints = 128,
+                  .mostRounds = 9,
+                  .paperPoints = 512,
+                  .elementsPoints = 128,
+                  .pictureSize = 512,
+                  .places = 1000,
+                  .lattices = 4,
+                  .seconds = 420,
+                  .longestRunMs = 8e3};
+    if (!request.resolutions.empty()) {
+        extent.resolutions = request.resolutions;
+        std::sort(extent.resolutions.begin(), extent.resolutions.end());
+        extent.variationPoints = extent.resolutions[extent.resolutions.size() / 2];
+    }
+    if (request.rounds) extent.mostRounds = *request.rounds;
+    if (request.seconds) extent.seconds = *request.seconds;
+    return extent;
+}
+
+void writeFile(const std::filesystem::path& path, const std::string& text) {
+    AtomicFile file(path.string());
+    file.writeAt(0, text.data(), text.size());
+    file.commit();
+}
+
+std::string csvOf(const Json& runs) {
+    std::string text =
+        "variant,criterion,asked,voxels,covered,levels,spacing,median_ms,low_ms,high_ms,rounds,processor_ms,"
+        "error_max,error_p999,error_rms,picture_rms,peak_memory_bytes\n";
+    const auto cell = [](const Json& value) { return value.is_null() ? std::string() : value.dump(); };
+    for (const Json& run : runs)
+        text += fmt::format("\"{}\",{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+                            run["variant"].get<std::string>(), cell(run["criterion"]), cell(run["asked"]),
+                            cell(run["voxels"]), cell(run["covered"]), cell(run["levels"]),
+                            cell(run["spacing"]), cell(run["ms"]["median"]), cell(run["ms"]["low"]),
+                            cell(run["ms"]["high"]), cell(run["ms"]["count"]), cell(run["processor_ms"]),
+                            cell(run["error"]["max"]), cell(run["error"]["p999"]), cell(run["error"]["rms"]),
+                            cell(run["picture_rms"]), cell(run["peak_memory_bytes"]));
+    return text;
+}
+
+class Benchmark {
+  public:
+    Benchmark(const BenchmarkRequest& request, Job& job)
+        : request_(request), job_(job), extent_(extentOf(request)) {}
+
+    Json run();
+
+  private:
+    void openMeshAndField();
+    void addBrickCases();
+    void addElementCases();
+    void addWarmCases();
+    void addPaperCases();
+    void add(BrickCase bricks, const std::string& ladder, bool isOfElements = false);
+    void add(WarmCase warm);
+    void addPictures();
+    void addMemory();
+    Json oracleJson();
+    Json againJson() const;
+    Json runsJson() const;
+    Json elementsJson() const;
+    Json warmJsons() const;
+    Json paperJson() const;
+    Json inputJson() const;
+    GlThread* device();
+    bool isMain(const BenchmarkVariant& variant) const { return variant.role == VariantRole::main; }
+    void say(const std::string& text) const { job_.say(text); }
+
+    struct Bricks {
+        BrickCase bricks;
+        std::size_t at = 0;
+        bool isOfElements = false;
+    };
+    struct Warm {
+        WarmCase warm;
+        std::size_t at = 0;
+    };
+
+    const BenchmarkRequest& request_;
+    Job& job_;
+    Extent extent_;
+    TetMesh mesh_;  // with the one field
+    std::string meshName_;
+    VariantList list_;
+    std::vector<TimedCase> cases_;
+    std::deque<Bricks> bricks_;
+    std::deque<TetMesh> boxes_;
+    std::deque<Warm> warm_;
+    std::optional<PaperCases> paper_;
+    std::size_t paperAt_ = 0, paperCount_ = 0;
+    std::vector<std::string> absent_;
+    std::string oracleCsv_;
+};
+
+void Benchmark::openMeshAndField() {
+    ReadOptions options;
+    if (!request_.field.empty()) options.fields = {request_.field};
+    MeshFile file = openMesh(request_.mesh, options, job_);
+    const TetMesh& mesh = file.mesh;
+    say(importText(request_.mesh, file.statistics, mesh.boundsWorld()));
+    int field = -1;
+    if (!request_.field.empty())
+        field = selectFields(mesh, {{request_.field, request_.field}}).fields.at(0);
+    else
+        for (std::size_t f = 0; field < 0 && f < mesh.fields.size(); ++f)
+            if (mesh.fields[f].components == 1 && mesh.fields[f].location == FieldLocation::point)
+                field = int(f);
+    if (field < 0)
+        throw InputError(
+            fmt::format("{}: it has no scalar point field; choose one with --field", request_.mesh));
+    mesh_ = std::move(file.mesh);
+    Field only = std::move(mesh_.fields[std::size_t(field)]);
+    mesh_.fields.clear();
+    mesh_.fields.push_back(std::move(only));
+    meshName_ = std::filesystem::path(request_.mesh).filename().string();
+}
+
+void Benchmark::add(BrickCase bricks, const std::string& ladder, bool isOfElements) {
+    bricks_.push_back({std::move(bricks), cases_.size(), isOfElements});
+    BrickCase& kept = bricks_.back().bricks;
+    TimedCase one = timedCase(kept, fmt::format("{}, {}", ladder, kept.variant->name));
+    if (isOfElements) {
+        one.work = double(kept.mesh->elementCount());
+        one.what += fmt::format(", {} elements", formatCount(kept.mesh->elementCount()));
+    } else {
+        // Refinement by error has no measure of its work ahead.
+        const double points = kept.refine.resolution;
+        one.work = points > 0 ? points * points * points : 1 / std::max(kept.bound, 1e-3);
+        if (kept.criterion == "element size") one.work = std::pow(kept.refine.samplesPerElement, 3);
+    }
+    cases_.push_back(std::move(one));
+}
+
+void Benchmark::addBrickCases() {
+    for (const BenchmarkVariant& v : list_.variants) {
+        if (v.role == VariantRole::variation) {
+            add(uniformCase(v, mesh_, extent_.variationPoints), "uniform");
+            continue;
+        }
+        for (const int points : extent_.resolutions) add(uniformCase(v, mesh_, points), "uniform");
+        if (v.role == VariantRole::again) continue;
+        for (const double bound : extent_.bounds) add(errorCase(v, mesh_, bound), "error");
+        if (!isMain(v)) continue;
+        for (const double samples : extent_.elementSamples)
+            add(elementSizeCase(v, mesh_, samples), "element size");
+        for (const int points : extent_.focusPoints) add(focusCase(v, mesh_, points), "focus");
+    }
+}
+
+void Benchmark::addElementCases() {
+    for (const int elements : extent_.elements) boxes_.push_back(gradedBox(elements));
+    for (const BenchmarkVariant& v : list_.variants) {
+        if (v.role == VariantRole::variation || v.role == VariantRole::again) continue;
+        for (const TetMesh& box : boxes_) {
+            BrickCase bricks = uniformCase(v, box, extent_.elementsPoints);
+            bricks.isErrorMeasured = false;
+            add(std::move(bricks), "elements", true);
+        }
+    }
+}
+
+/// The device that samples may stay on; null without one.
+GlThread* Benchmark::device() {
+    for (const BenchmarkVariant& v : list_.variants)
+        if (v.resampler->info().isOnDevice && v.role == VariantRole::main) try {
+                std::optional<GlPlatform> wanted;
+                if (!request_.bind.target.empty()) wanted = parseGlPlatform(request_.bind.target);
+                return &sharedGlThread(chooseGlPlatform(wanted));
+            } catch (const GlError& error) {
+                absent_.push_back(fmt::format("No samples are left on a device: {}", error.what()));
+                return nullptr;
+            }
+    return nullptr;
+}
+
+void Benchmark::add(WarmCase warm) {
+    warm_.push_back({std::move(warm), cases_.size()});
+    const WarmCase& kept = warm_.back().warm;
+    cases_.push_back(timedCase(
+        warm_.back().warm, fmt::format("warm, {}, {}", kept.variant->name, kept.device ? "device" : "blocks")));
+}
+
+void Benchmark::addWarmCases() {
+    GlThread* device = this->device();
+    for (const BenchmarkVariant& v : list_.variants) {
+        const bool isOther = v.bind.primitives == Primitives::processor && v.role == VariantRole::variation;
+        if (!isMain(v) && !isOther) continue;
+        for (GlThread* to : {static_cast<GlThread*>(nullptr), device}) {
+            if (to == nullptr || device) {
+                add(warmBricks(v, mesh_, 1, to));
+                add(warmBricks(v, mesh_, 4, to));
+                for (const int points : extent_.warmPoints) add(warmCube(v, mesh_, points, to));
+            }
+            if (!device) break;
+        }
+    }
+}
+
+void Benchmark::addPaperCases() {
+    try {
+        paper_.emplace(mesh_, std::filesystem::path(meshName_).stem().string(), list_.variants,
+                       extent_.paperPoints);
+    } catch (const InputError& error) {
+        absent_.push_back(fmt::format("The grids of 2001 are left out: {}", error.what()));
+        return;
+    }
+    paperAt_ = cases_.size();
+    for (TimedCase& one : paper_->timedCases()) cases_.push_back(std::move(one));
+    paperCount_ = cases_.size() - paperAt_;
+}
+
+/// Of the first algorithm's bricks, peers' and those as published; others have the same values.
+void Benchmark::addPictures() {
+    const Execution quiet = job_.execution.withoutProgress();
+    try {
+        const PictureReference reference(mesh_, mesh_.fields[0].name, extent_.pictureSize, quiet);
+        std::int64_t done = 0;
+        for (Bricks& one : bricks_) {
+            const BenchmarkVariant& v = *one.bricks.variant;
+            job_.execution.report(Stage::comparing, done++, std::int64_t(bricks_.size()));
+            const bool isWanted = &v == &list_.variants.front() || v.role == VariantRole::published ||
+                                  v.role == VariantRole::peer;
+            if (!isWanted || one.isOfElements || !cases_[one.at].isTimed()) continue;
+            BrickResult result = makeBricks(one.bricks, quiet);
+            one.bricks.pictureRms =
+                reference.measure(*v.resampler, one.bricks.refine, result, "", quiet).drawn.all;
+        }
+    } catch (const GlError& error) {
+        absent_.push_back(fmt::format("No pictures are compared: {}", error.what()));
+    } catch (const InputError& error) {
+        absent_.push_back(fmt::format("No pictures are compared: {}", error.what()));
+    }
+}
+
+/// Of the whole program, in processes of its own.
+void Benchmark::addMemory() {
+    for (Bricks& one : bricks_) {
+        const BenchmarkVariant& v = *one.bricks.variant;
+        const bool isWanted = isMain(v) && !one.isOfElements && one.bricks.criterion == "uniform" &&
+                              (!request_.isQuick || one.bricks.refine.resolution == extent_.resolutions.back());
+        if (!isWanted || !cases_[one.at].isTimed() || request_.program.empty()) continue;
+        one.bricks.peakMemoryBytes =
+            peakMemoryOfProgram(request_.program, request_.mesh, mesh_.fields[0], one.bricks, job_.execution);
+    }
+}
+
+Json Benchmark::oracleJson() {
+    const Execution quiet = job_.execution.withoutProgress();
+    OracleOptions options;
+    options.places = extent_.places;
+    options.lattices = extent_.lattices;
+    options.seed = request_.seed;
+    const OraclePlaces places(mesh_, 0, options, quiet);
+    std::vector<std::string> names;
+    std::vector<OracleFigures> all;
+    Json variants = Json::array();
+    std::set<std::string> timedOnes;
+    for (const Bricks& one : bricks_)
+        if (cases_[one.at].isTimed()) timedOnes.insert(one.bricks.variant->name);
+    for (const BenchmarkVariant& v : list_.variants) {
+        if (v.role == VariantRole::again || !timedOnes.count(v.name)) continue;
+        job_.execution.report(Stage::checking, std::int64_t(all.size()), std::int64_t(list_.variants.size()));
+        OracleFigures figures = places.measure(*v.resampler, v.bind, quiet);
+        variants.push_back({{"variant", v.name},
+                            {"max", figures.error.max},
+                            {"p999", figures.error.p999},
+                            {"rms", figures.error.rms},
+                            {"places", figures.error.count},
+                            {"holes", figures.holes},
+                            {"spills", figures.spills}});
+        names.push_back(v.name);
+        all.push_back(std::move(figures));
+    }
+    oracleCsv_ = places.csv(names, all);
+    return {{"places", places.count()},
+            {"lattices", places.latticeCount()},
+            {"spill_voxels", options.spillVoxels},
+            {"file", "oracle.csv"},
+            {"variants", std::move(variants)}};
+}
+
+Json Benchmark::againJson() const {
+    Json all = Json::array();
+    for (const Bricks& twin : bricks_) {
+        if (twin.bricks.variant->role != VariantRole::again || !cases_[twin.at].isTimed()) continue;
+        for (const Bricks& one : bricks_) {
+            if (one.bricks.variant != &list_.variants.front() || one.isOfElements ||
+                one.bricks.asked != twin.bricks.asked || one.bricks.criterion != twin.bricks.criterion)
+                continue;
+            const TimedCase &first = cases_[one.at], &second = cases_[twin.at];
+            if (!first.isTimed()) continue;
+            const MedianInterval ratio = ratioOf(first, second);
+            all.push_back({{"variant", one.bricks.variant->name},
+                           {"criterion", one.bricks.criterion},
+                           {"asked", one.bricks.asked},
+                           {"ratio", intervalJson(ratio)},
+                           {"agrees", ratio.holds(1)}});
+        }
+    }
+    return all;
+}
+
+Json Benchmark::runsJson() const {
+    Json all = Json::array();
+    for (const Bricks& one : bricks_)
+        if (!one.isOfElements && cases_[one.at].isTimed())
+            all.push_back(runJson(one.bricks, cases_[one.at]));
+    return all;
+}
+
+Json Benchmark::elementsJson() const {
+    Json points = Json::array();
+    for (const Bricks& one : bricks_)
+        if (one.isOfElements && cases_[one.at].isTimed())
+            points.push_back({{"variant", one.bricks.variant->name},
+                              {"x", one.bricks.mesh->elementCount()},
+                              {"ms", intervalJson(cases_[one.at].interval())}});
+    return scalingJson(points);
+}
+
+Json Benchmark::warmJsons() const {
+    Json all = Json::array();
+    for (const Warm& one : warm_)
+        if (cases_[one.at].isTimed()) all.push_back(warmJson(one.warm, cases_[one.at]));
+    return all;
+}
+
+Json Benchmark::paperJson() const {
+    return paper_ ? paper_->json(std::span(cases_).subspan(paperAt_, paperCount_)) : Json::object();
+}
+
+Json Benchmark::inputJson() const {
+    const Field& field = mesh_.fields[0];
+    double range = 0;
+    for (int c = 0; c < field.components; ++c) range = std::max(range, fieldRange(field, c).width());
+    return {{"mesh", meshName_},
+            {"nodes", mesh_.points.size()},
+            {"elements", mesh_.elementCount()},
+            {"field", field.name},
+            {"location", field.location == FieldLocation::cell ? "cell" : "point"},
+            {"components", field.components},
+            {"range", range}};
+}
+
+Json Benchmark::run() {
+    const Timer timer;
+    const std::filesystem::path folder(request_.folder);
+    const std::optional<Json> earlier =
+        request_.comparedWith.empty() ? std::nullopt : std::optional(readBenchmark(request_.comparedWith));
+    openMeshAndField();
+    const int threads = job_.execution.threadCount();
+    list_ = listVariants(request_, threads);
+    absent_ = list_.absent;
+    std::vector<MachineRates> rates;
+    for (const int count : std::set<int>{1, threads})
+        rates.push_back(measureMachine(count, request_.isQuick ? 3 : 7));
+    addBrickCases();
+    addElementCases();
+    addWarmCases();
+    addPaperCases();
+    const int rounds = runRounds(cases_,
+                                 {.rounds = extent_.mostRounds,
+                                  .seed = request_.seed,
+                                  .longestRunMs = extent_.longestRunMs,
+                                  .longestMs = 1e3 * extent_.seconds},
+                                 job_.execution, [this](const std::string& text) { say(text); });
+    for (const TimedCase& one : cases_)
+        if (!one.leftOut.empty()) absent_.push_back(one.leftOut);
+    addPictures();
+    addMemory();
+
+    Json document = documentHead("bench");
+    document["input"] = inputJson();
+    document["machine"] = machineJson(threads, list_.variants, request_.bind);
+    Json variants = Json::array();
+    for (const BenchmarkVariant& v : list_.variants) variants.push_back(variantJson(v));
+    document["variants"] = std::move(variants);
+    document["runs"] = runsJson();
+    document["again"] = againJson();
+    document["equal_error"] = equalErrorJson(document["runs"]);
+    document["pareto"] = paretoJson(document["runs"], document["variants"]);
+    document["scaling"] = {{"resolution", resolutionScalingJson(document["runs"])},
+                           {"elements", elementsJson()},
+                           {"elements_resolution", extent_.elementsPoints}};
+    document["oracle"] = oracleJson();
+    const double meshBytes = double(mesh_.tets.size() * sizeof mesh_.tets[0] +
+                                    mesh_.points.size() * sizeof mesh_.points[0] +
+                                    mesh_.fields[0].values.size() * sizeof(double));
+    document["roofline"] = rooflineJson(document["runs"], document["variants"], meshBytes,
+                                        mesh_.fields[0].components, rates);
+    document["warm"] = warmJsons();
+    document["paper"] = paperJson();
+    document["absent"] = absent_;
+    document["advice"] = adviceOn(document, meshName_);
+    if (earlier) document["compared"] = compareBenchmarks(*earlier, document);
+    document["settings"] = {{"quick", request_.isQuick},
+                            {"rounds", rounds},
+                            {"seconds", timer.elapsedMs() / 1000},
+                            {"resolutions", extent_.resolutions},
+                            {"seed", request_.seed}};
+
+    say(benchmarkText(document, job_.textWidth));
+    writeFile(folder / "oracle.csv", oracleCsv_);
+    writeFile(folder / "runs.csv", csvOf(document["runs"]));
+    writeFile(folder / "report.json", documentText(document));
+    writeFile(folder / "index.html", benchmarkPage(document));
+    say(fmt::format("wrote {}\n", (folder / "index.html").string()));
+    return document;
+}
+
+void checkFolder(const BenchmarkRequest& request, const Job& job) {
+    std::error_code error;
+    const std::filesystem::path folder(request.folder);
+    std::filesystem::create_directories(folder, error);
+    if (error || !std::filesystem::is_directory(folder))
+        throw IoError(fmt::format("{}: the folder can't be made: {}", request.folder,
+                                  error ? error.message() : "something else has that name"));
+    std::vector<OutputPath> outputs{{"--json", job.reportPath}};
+    for (const char* name : {"index.html", "report.json", "runs.csv", "oracle.csv"}) {
+        outputs.push_back({"--output", (folder / name).string()});
+        checkWritable((folder / name).string());
+    }
+    checkOutputPaths({request.mesh}, outputs);
+}
+
+}  // namespace
+
+Json runBenchmark(const BenchmarkRequest& request, Job& job) {
+    checkFolder(request, job);
+    return Benchmark(request, job).run();
+}
+
+}  // namespace tessera
