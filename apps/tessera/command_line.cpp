@@ -620,29 +620,47 @@ void addCompareOptions(CLI::App& command, CompareArguments& a) {
         "  tessera compare *.vtu --markdown");
 }
 
-void addPaperTablesOptions(CLI::App& command, PaperTablesArguments& a) {
-    command.add_option("mesh", a.request.mesh, "mesh file; the paper's is the bluntfin")->required();
-    a.algorithm.primitives = nameOf(Primitives::processor);
-    addBindOptions(command, a.algorithm);
+void addBenchOptions(CLI::App& command, BenchArguments& a) {
+    command.add_option("mesh", a.request.mesh, "mesh file")->required();
+    command
+        .add_option("-o,--output", a.request.folder, "the folder for the report; made when it isn't there")
+        ->required();
+    command.add_flag("--quick", a.request.isQuick, "fewer cases: about a minute on two cores");
     command.add_option("--field", a.request.field,
                        "the field to sample (default: the first scalar field of the points)");
-    command.add_option("--runs", a.request.runs, "runs of each algorithm; times are medians")
-        ->check(CLI::Range(1, 1000))
-        ->capture_default_str();
+    command.add_option("--algorithms", a.request.algorithms,
+                       "only these, as in compare (default: all, with all targets, formats and threads)");
+    command.add_option("--gl", a.algorithm.gl, "OpenGL platform (default: the first that can be had)")
+        ->check(CLI::IsMember({"egl-device", "egl-surfaceless", "osmesa"}));
     command
-        .add_option("--max-size", a.request.maxSize,
-                    "leave out grids with more points than this along an axis (there are 128 to 1024)")
-        ->check(CLI::Range(128, 1024))
+        .add_option("--peer", a.peers,
+                    "name=command: a program of yours that samples meshes (docs/benchmark_peers.md); may be "
+                    "repeated")
+        ->type_size(1)
+        ->allow_extra_args(false);
+    command.add_flag("--no-vtk", a.withoutVtk, "without VTK's vtkResampleToImage as a peer");
+    command.add_option("--points", a.request.resolutions, "lattice points along the longest axis: a,b,...")
+        ->delimiter(',')
+        ->check(CLI::Range(2, 1024));
+    command.add_option("--runs", a.request.rounds, "rounds at most (default: 9, quick 6)")
+        ->check(CLI::Range(1, 1000));
+    command
+        .add_option("--seconds", a.request.seconds,
+                    "for all rounds together: there are fewer, but 6, where they would take longer "
+                    "(default: 420, quick 24)")
+        ->check(CLI::Range(1.0, 1e6));
+    command.add_option("--seed", a.request.seed, "of the orders and of the places that are checked")
         ->capture_default_str();
-    command.add_flag("--as-published", a.request.asPublished,
-                     "time slicing-2001 and hybrid-2001, the methods as they were published");
+    command.add_option("--compare", a.request.comparedWith,
+                       "the report.json of an earlier run: tells what got faster or slower since");
     addCommonOptions(command, a.common);
     command.footer(
-        "Times the algorithms on the mesh, its double (mirrored at a plane perpendicular to y) and its "
-        "quadruple (y "
-        "and z), on the grids of Weiler and\nErtl 2001, and prints their figures 9 to 11 beside.\n"
-        "Examples:\n  tessera paper-tables bluntfin.vtu\n"
-        "  tessera paper-tables bluntfin.vtu --as-published --max-size 256 --json tables.json");
+        "Times every algorithm, in all its ways, and peers on this mesh, in rounds of random order; measures "
+        "their errors against exact arithmetic, of the reconstruction and of pictures. Writes index.html, "
+        "report.json, runs.csv and oracle.csv into the folder.\n"
+        "Examples:\n  tessera bench flow.vtu -o report --quick\n"
+        "  tessera bench flow.vtu -o report --field pressure --compare earlier/report.json\n"
+        "  tessera bench flow.vtu -o report --peer \"probe=python3 bench/peer_probe.py\"");
 }
 
 /// A command that runs with what its options were given.
@@ -690,8 +708,8 @@ void describe(CLI::App& app, CommandLine& line) {
     addView(app, line);
     addCommand(app, line, "compare", "several algorithms on one lattice: coverage, values, times",
                addCompareOptions, runCompare);
-    addCommand(app, line, "paper-tables", "the algorithms' times beside those of the paper they come from",
-               addPaperTablesOptions, runPaperTables);
+    addCommand(app, line, "bench", "what accuracy costs in time: every algorithm and peers, as a page",
+               addBenchOptions, runBench);
     addCommand(app, line, "slice", "cut a mesh with any plane: a float EXR or a .png", addSliceOptions,
                runSlice);
     addCommand(app, line, "focus-trace", "replay a moving focus: times, bricks and errors, step by step",

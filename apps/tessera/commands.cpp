@@ -144,11 +144,20 @@ int runCompare(const CompareArguments& a) {
     return comparison.problems.empty() ? 0 : kExitDisagree;
 }
 
-int runPaperTables(const PaperTablesArguments& a) {
-    PaperTablesRequest request = a.request;
+int runBench(const BenchArguments& a) {
+    BenchmarkRequest request = a.request;
     request.bind = bindOptions(a.algorithm);
+    request.hasVtk = !a.withoutVtk;
+    std::error_code error;
+    request.program = std::filesystem::canonical(programPath(), error).string();
+    for (const std::string& peer : a.peers) {
+        const std::size_t equals = peer.find('=');
+        if (equals == 0 || equals == std::string::npos || equals + 1 == peer.size())
+            throw InputError(fmt::format("--peer: expected name=command, got '{}'", peer));
+        request.peers.push_back({peer.substr(0, equals), peer.substr(equals + 1)});
+    }
     Session session(a.common);
-    session.writeReport(makePaperTables(request, session.job));
+    session.writeReport(runBenchmark(request, session.job));
     return 0;
 }
 

@@ -2,13 +2,13 @@
 
 #include <string>
 
+#include "benchmark/run_benchmark.h"
 #include "job/compare_meshes.h"
 #include "job/cut_mesh.h"
 #include "job/describe_files.h"
 #include "job/draw_vdb.h"
 #include "job/export_tets.h"
 #include "job/focus_trace.h"
-#include "job/paper_tables.h"
 #include "job/render_frames.h"
 #include "job/render_scene.h"
 #include "job/verify_file.h"
@@ -64,10 +64,12 @@ struct CompareArguments {
     std::string fields;
     CompareRequest request;
 };
-struct PaperTablesArguments {
+struct BenchArguments {
     CommonOptions common;
-    AlgorithmArguments algorithm;  ///< its name is not used
-    PaperTablesRequest request;
+    AlgorithmArguments algorithm;    ///< its platform alone is used
+    std::vector<std::string> peers;  ///< "name=command"
+    bool withoutVtk = false;
+    BenchmarkRequest request;
 };
 
 /// Each returns the exit code and throws the library's errors.
@@ -78,7 +80,7 @@ int runTets(const TetsArguments& arguments);
 int runPicture(const PictureArguments& arguments);
 int runRender(const RenderArguments& arguments);
 int runCompare(const CompareArguments& arguments);
-int runPaperTables(const PaperTablesArguments& arguments);
+int runBench(const BenchArguments& arguments);
 /// @param words for the program that has the window.
 int runView(const std::vector<std::string>& words);
 int runSlice(const SliceArguments& arguments);

@@ -5,15 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "benchmark/peer_process.h"
 #include "tessera/resampler.h"
 
 namespace tessera {
-
-/// A program that samples meshes: what it is called in the report, and the command that starts it
-/// (docs/benchmark_peers.md).
-struct PeerCommand {
-    std::string name, command;
-};
 
 /// What `tessera bench` is asked for.
 struct BenchmarkRequest {

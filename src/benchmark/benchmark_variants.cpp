@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <set>
 
 #include "benchmark/peer_resampler.h"
@@ -93,7 +94,7 @@ class Lister {
     void addPeers() {
         std::vector<PeerCommand> commands;
         if (request_.hasVtk) {
-            if (const auto vtk = vtkPeer(request_.program))
+            if (const auto vtk = vtkPeer(std::filesystem::path(request_.program).parent_path().string()))
                 commands.push_back(*vtk);
             else
                 list_.absent.push_back("VTK is left out: its program isn't beside this one");

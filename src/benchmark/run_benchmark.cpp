@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <set>
@@ -23,6 +24,8 @@
 #include "benchmark/program_memory.h"
 #include "benchmark/warm_cases.h"
 #include "files/atomic_file.h"
+#include "gl/gl_platform.h"
+#include "job/field_selection.h"
 #include "job/import_mesh.h"
 #include "job/output_paths.h"
 #include "job/report_text.h"
@@ -36,8 +39,8 @@ namespace {
 struct Extent {
     std::vector<int> resolutions, focusPoints, warmPoints, elements;
     std::vector<double> bounds, elementSamples;
-    int variationPoints = 0, mostRounds = 0, paperPoints = 0, elementsPoints = 0, pictureSize = 0,
-        places = 0, lattices = 0;
+    int variationPoints = 0, mostRounds = 0, paperPoints = 0, elementsPoints = 0, pictureSize = 0, places = 0,
+        lattices = 0;
     double seconds = 0, longestRunMs = 0;
 };
 
@@ -58,7 +61,7 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .places = 1000,
                   .lattices = 2,
                   .seconds = 24,
-                  .longestRunMs = 300};
+                  .longestRunMs = 400};
     else
         extent = {.resolutions = {32, 64, 128, 256},
                   .focusPoints = {128, 256, 512},
@@ -245,8 +248,8 @@ GlThread* Benchmark::device() {
 void Benchmark::add(WarmCase warm) {
     warm_.push_back({std::move(warm), cases_.size()});
     const WarmCase& kept = warm_.back().warm;
-    cases_.push_back(timedCase(
-        warm_.back().warm, fmt::format("warm, {}, {}", kept.variant->name, kept.device ? "device" : "blocks")));
+    cases_.push_back(timedCase(warm_.back().warm, fmt::format("warm, {}, {}", kept.variant->name,
+                                                              kept.device ? "device" : "blocks")));
 }
 
 void Benchmark::addWarmCases() {
@@ -305,8 +308,9 @@ void Benchmark::addPictures() {
 void Benchmark::addMemory() {
     for (Bricks& one : bricks_) {
         const BenchmarkVariant& v = *one.bricks.variant;
-        const bool isWanted = isMain(v) && !one.isOfElements && one.bricks.criterion == "uniform" &&
-                              (!request_.isQuick || one.bricks.refine.resolution == extent_.resolutions.back());
+        const bool isWanted =
+            isMain(v) && !one.isOfElements && one.bricks.criterion == "uniform" &&
+            (!request_.isQuick || one.bricks.refine.resolution == extent_.resolutions.back());
         if (!isWanted || !cases_[one.at].isTimed() || request_.program.empty()) continue;
         one.bricks.peakMemoryBytes =
             peakMemoryOfProgram(request_.program, request_.mesh, mesh_.fields[0], one.bricks, job_.execution);
@@ -372,8 +376,7 @@ Json Benchmark::againJson() const {
 Json Benchmark::runsJson() const {
     Json all = Json::array();
     for (const Bricks& one : bricks_)
-        if (!one.isOfElements && cases_[one.at].isTimed())
-            all.push_back(runJson(one.bricks, cases_[one.at]));
+        if (!one.isOfElements && cases_[one.at].isTimed()) all.push_back(runJson(one.bricks, cases_[one.at]));
     return all;
 }
 
@@ -452,11 +455,11 @@ Json Benchmark::run() {
                            {"elements", elementsJson()},
                            {"elements_resolution", extent_.elementsPoints}};
     document["oracle"] = oracleJson();
-    const double meshBytes = double(mesh_.tets.size() * sizeof mesh_.tets[0] +
-                                    mesh_.points.size() * sizeof mesh_.points[0] +
-                                    mesh_.fields[0].values.size() * sizeof(double));
-    document["roofline"] = rooflineJson(document["runs"], document["variants"], meshBytes,
-                                        mesh_.fields[0].components, rates);
+    const double meshBytes =
+        double(mesh_.tets.size() * sizeof mesh_.tets[0] + mesh_.points.size() * sizeof mesh_.points[0] +
+               mesh_.fields[0].values.size() * sizeof(double));
+    document["roofline"] =
+        rooflineJson(document["runs"], document["variants"], meshBytes, mesh_.fields[0].components, rates);
     document["warm"] = warmJsons();
     document["paper"] = paperJson();
     document["absent"] = absent_;

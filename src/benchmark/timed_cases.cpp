@@ -68,6 +68,21 @@ class TimeLimit {
     std::thread watch_;
 };
 
+/// A sample of a short run is the median one of several, as many as fit into this.
+constexpr double kSampleMs = 40;
+constexpr int kMostRepeats = 15;
+
+CaseSample sampleOf(const TimedCase& one, const Execution& execution) {
+    const double fit = one.firstMs > 0 ? kSampleMs / one.firstMs : kMostRepeats;
+    const int repeats = std::clamp(int(fit), 1, kMostRepeats) | 1;
+    std::vector<CaseSample> samples;
+    for (int r = 0; r < repeats; ++r) samples.push_back(one.run(execution));
+    const auto middle = samples.begin() + repeats / 2;
+    std::nth_element(samples.begin(), middle, samples.end(),
+                     [](const CaseSample& a, const CaseSample& b) { return a.ms < b.ms; });
+    return std::move(*middle);
+}
+
 /// What the last rung of a ladder took.
 struct Rung {
     double ms = 0, work = 0;
@@ -128,7 +143,7 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         runFirst(one, rungs[one.ladder], options, execution);
         if (!one.leftOut.empty()) continue;
         timedOnes.push_back(&one);
-        roundMs += one.firstMs;
+        roundMs += std::max(one.firstMs, std::min(kSampleMs, kMostRepeats * one.firstMs));
     }
     // First runs are slower than later ones, so there is time for what is left.
     const int rounds = std::min(options.rounds, std::max(kFewestRounds, int(options.longestMs / roundMs)));
@@ -140,7 +155,7 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         if (place == 0) std::shuffle(timedOnes.begin(), timedOnes.end(), random);
         execution.report(Stage::sampling, run, runs);
         TimedCase& one = *timedOnes[place];
-        one.samples.push_back(one.run(execution.withoutProgress()));
+        one.samples.push_back(sampleOf(one, execution.withoutProgress()));
     }
     return rounds;
 }
