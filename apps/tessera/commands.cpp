@@ -146,6 +146,13 @@ int runCompare(const CompareArguments& a) {
 
 int runBench(const BenchArguments& a) {
     BenchmarkRequest request = a.request;
+    constexpr std::string_view kGraded = "graded:";
+    if (request.mesh.starts_with(kGraded)) {
+        request.gradedElements = parseCount("graded:N", request.mesh.substr(kGraded.size()), false);
+        if (request.gradedElements < 1 || request.gradedElements > 100'000'000)
+            throw InputError("graded:N takes 1 to 100M elements");
+        request.mesh.clear();
+    }
     request.bind = bindOptions(a.algorithm);
     request.hasVtk = !a.withoutVtk;
     std::error_code error;

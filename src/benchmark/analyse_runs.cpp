@@ -298,7 +298,10 @@ Json scalingJson(const Json& points) {
     for (const std::string& variant : variantsOf(points)) {
         Json own = Json::array();
         for (const Json& point : points)
-            if (point["variant"] == variant) own.push_back({{"x", point["x"]}, {"ms", point["ms"]}});
+            if (point["variant"] == variant) {
+                own.push_back(point);
+                own.back().erase("variant");
+            }
         all.push_back(fitJson(variant, own));
     }
     return all;

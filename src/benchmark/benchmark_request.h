@@ -12,10 +12,12 @@ namespace tessera {
 
 /// What `tessera bench` is asked for.
 struct BenchmarkRequest {
-    std::string mesh, folder;  ///< folder: where the report goes; made when it isn't there
-    std::string field;         ///< empty: the first scalar field of the points
-    std::string algorithms;    ///< as listAlgorithms() takes them; empty: all there are, all their ways
-    BindOptions bind;          ///< platform of those on a device
+    std::string mesh;                 ///< a file; empty: a graded box
+    std::int64_t gradedElements = 0;  ///< of it, above 0
+    std::string folder;               ///< where the report goes; made when it isn't there
+    std::string field;                ///< empty: the first scalar field of the points
+    std::string algorithms;  ///< as listAlgorithms() takes them; empty: all there are, all their ways
+    BindOptions bind;        ///< platform of those on a device
     std::vector<PeerCommand> peers;
     bool hasVtk = true;             ///< VTK is a peer, where its program stands beside this one
     bool isQuick = false;           ///< few cases, a minute in all

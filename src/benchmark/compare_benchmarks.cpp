@@ -1,17 +1,148 @@
 #include "benchmark/compare_benchmarks.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "benchmark/median_interval.h"
 #include "files/input_file.h"
 #include "files/json_parse.h"
 #include "tessera/error.h"
 
 namespace tessera {
 
-Json readBenchmark(const std::string& path) {
-    return parseJson<Json>(readWholeFile(path));
+namespace {
+
+/// By which all cases of an algorithm together may differ between two runs of one build.
+constexpr double kNoise = 0.06;
+
+/// A case that two documents may both have.
+struct ComparedCase {
+    std::string algorithm, what;
+    MedianInterval ms;
+};
+
+/// By what it is.
+std::map<std::string, ComparedCase> casesOf(const Json& document) {
+    std::map<std::string, std::string> algorithms;
+    for (const Json& variant : document.at("variants"))
+        if (variant.at("role") != "again")
+            algorithms[variant.at("name").get<std::string>()] = variant.at("algorithm").get<std::string>();
+    std::map<std::string, ComparedCase> cases;
+    const auto add = [&](const std::string& variant, const std::string& what, const Json& ms) {
+        const auto found = algorithms.find(variant);
+        if (found == algorithms.end()) return;
+        const std::string name = fmt::format("{}, {}", variant, what);
+        cases[name] = {found->second, name, intervalFrom(ms)};
+    };
+    for (const Json& run : document.at("runs"))
+        add(run.at("variant"),
+            fmt::format("{}, {}", run.at("criterion").get<std::string>(), run.at("asked").get<std::string>()),
+            run.at("ms"));
+    for (const Json& fit : document.at("scaling").at("elements"))
+        for (const Json& point : fit.at("points"))
+            add(fit.at("variant"), fmt::format("{} elements", point.at("x").get<std::int64_t>()),
+                point.at("ms"));
+    for (const Json& warm : document.at("warm"))
+        add(warm.at("variant"),
+            fmt::format("bound already, {} to {}", warm.at("case").get<std::string>(),
+                        warm.at("to").get<std::string>()),
+            warm.at("ms"));
+    return cases;
 }
 
-Json compareBenchmarks(const Json&, const Json&) {
-    return {{"sentences", Json::array()}};
+struct CaseRatio {
+    std::string what;
+    double ratio = 1;
+    bool isApart = false;  ///< its two intervals have nothing in common
+};
+
+std::string times(double ratio) {
+    return fmt::format("{:.3g}", ratio);
+}
+
+}  // namespace
+
+Json readBenchmark(const std::string& path) {
+    Json document;
+    try {
+        document = parseJson<Json>(readWholeFile(path));
+    } catch (const Json::exception& error) {
+        throw InputError(fmt::format("{}: it is no JSON: {}", path, error.what()));
+    }
+    if (!document.is_object() || document.value("command", "") != "bench" || !document.contains("runs"))
+        throw InputError(fmt::format("{}: it is no report.json of tessera bench", path));
+    return document;
+}
+
+void checkComparable(const Json& earlier, const Json& later) {
+    for (const char* key : {"mesh", "elements", "field"})
+        if (earlier.at("input").at(key) != later.at("input").at(key))
+            throw InputError(fmt::format("--compare: the earlier report has {} {}, this one {}", key,
+                                         earlier["input"][key].dump(), later["input"][key].dump()));
+    if (earlier.at("machine").at("threads") != later.at("machine").at("threads"))
+        throw InputError(
+            fmt::format("--compare: the earlier report was made with {} threads, this one with {}",
+                        earlier["machine"]["threads"].dump(), later["machine"]["threads"].dump()));
+}
+
+Json compareBenchmarks(const Json& earlier, const Json& later) {
+    checkComparable(earlier, later);
+    const std::map<std::string, ComparedCase> before = casesOf(earlier), now = casesOf(later);
+    const double yardstick =
+        intervalFrom(later.at("yardstick")).median / intervalFrom(earlier.at("yardstick")).median;
+    std::map<std::string, std::vector<CaseRatio>> byAlgorithm;
+    Json cases = Json::array();
+    for (const auto& [name, one] : now) {
+        const auto found = before.find(name);
+        if (found == before.end()) continue;
+        const double ratio = one.ms.median / found->second.ms.median / yardstick;
+        const bool isApart = !one.ms.overlaps(found->second.ms);
+        byAlgorithm[one.algorithm].push_back({name, ratio, isApart});
+        cases.push_back({{"case", name}, {"algorithm", one.algorithm}, {"ratio", ratio}, {"apart", isApart}});
+    }
+    Json algorithms = Json::array();
+    std::vector<std::string> sentences;
+    for (const auto& [algorithm, ratios] : byAlgorithm) {
+        std::vector<double> values;
+        for (const CaseRatio& one : ratios) values.push_back(one.ratio);
+        const MedianInterval interval = medianInterval(std::move(values));
+        const bool isSlower = interval.median > 1 + kNoise && interval.low > 1;
+        const bool isFaster = interval.median < 1 / (1 + kNoise) && interval.high < 1;
+        const char* verdict = interval.count < 2 ? "too few cases"
+                              : isSlower         ? "slower"
+                              : isFaster         ? "faster"
+                                                 : "equal";
+        algorithms.push_back(
+            {{"algorithm", algorithm}, {"ratio", intervalJson(interval)}, {"verdict", verdict}});
+        if (interval.count < 2 || (!isSlower && !isFaster)) continue;
+        sentences.push_back(fmt::format(
+            "{} got {}: {} times the earlier time, the median of {} cases ({} to {}).", algorithm, verdict,
+            times(interval.median), interval.count, times(interval.low), times(interval.high)));
+    }
+    if (sentences.empty())
+        sentences.push_back(
+            fmt::format("Nothing got faster or slower beyond noise: {} cases compared.", cases.size()));
+    if (std::abs(std::log(yardstick)) > std::log(1 + kNoise))
+        sentences.push_back(
+            fmt::format("A fixed piece of work took {} times its earlier time: the machine was "
+                        "busier or idler. Ratios are over that.",
+                        times(yardstick)));
+    for (const char* key : {"processor", "opengl"})
+        if (earlier.at("machine").at(key) != later.at("machine").at(key))
+            sentences.push_back(fmt::format("The earlier report is from another machine or driver: {}.",
+                                            earlier["machine"][key].dump()));
+    return {{"commit", earlier.at("machine").at("commit")},
+            {"date", earlier.at("machine").at("date")},
+            {"yardstick", yardstick},
+            {"algorithms", std::move(algorithms)},
+            {"cases", std::move(cases)},
+            {"sentences", std::move(sentences)}};
 }
 
 }  // namespace tessera

@@ -9,7 +9,17 @@ namespace tessera {
 /// A benchmark's document from a report.json. Throws InputError when it isn't one.
 Json readBenchmark(const std::string& path);
 
+/// Throws InputError where two documents are of different meshes or fields, or have different threads: their
+/// times say nothing about each other.
+void checkComparable(const Json& earlier, const Json& later);
+
 /// What got faster or slower from one document to another, beyond what differs between runs of one build.
+///
+/// Times of one case differ between two runs of one program by more than their intervals within a run say: a
+/// machine has good and bad minutes. So the ratios of all cases of an algorithm are taken together, over the
+/// ratio of a fixed piece of work that is timed in every round (the yardstick). An algorithm is named when
+/// their median is off by more than 6 % and the interval of that median, by order statistics, doesn't hold 1.
+/// Gives {"yardstick": .., "algorithms": [..], "cases": [..], "sentences": [..]}.
 Json compareBenchmarks(const Json& earlier, const Json& later);
 
 }  // namespace tessera

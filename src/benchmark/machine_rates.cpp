@@ -86,4 +86,15 @@ MachineRates measureMachine(int threads, int runs) {
     return {threads, rate(0), 2 * rate(1), rate(2), rate(3), double(kSteps) / medianInterval(ms[4]).median};
 }
 
+double runYardstick(int threads) {
+    constexpr std::size_t kSteps = 8'000'000, kBytes = std::size_t(32) << 20;
+    static const std::vector<char> from(kBytes, 1);
+    static std::vector<char> to(kBytes);
+    const double arithmeticMs = timeShares(threads, kSteps, [](std::size_t, std::size_t n) { compute(n); });
+    const double memoryMs = timeShares(threads, kBytes, [](std::size_t at, std::size_t n) {
+        for (int pass = 0; pass < 2; ++pass) std::memcpy(to.data() + at, from.data() + at, n);
+    });
+    return arithmeticMs + memoryMs;
+}
+
 }  // namespace tessera

@@ -14,4 +14,8 @@ struct MachineRates {
 /// Medians of so many runs over 256 MiB; half a GiB is held meanwhile.
 MachineRates measureMachine(int threads, int runs);
 
+/// A fixed piece of work, some 20 ms of arithmetic and memory by so many threads, that has nothing to do with
+/// what is measured: how long it takes says how busy the machine is. Milliseconds.
+double runYardstick(int threads);
+
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <filesystem>
@@ -39,6 +40,7 @@ namespace {
 struct Extent {
     std::vector<int> resolutions, focusPoints, warmPoints, elements;
     std::vector<double> bounds, elementSamples;
+    std::vector<std::array<int, 2>> bricks;  ///< edges, and elements that they hold
     int variationPoints = 0, mostRounds = 0, paperPoints = 0, elementsPoints = 0, pictureSize = 0, places = 0,
         lattices = 0;
     double seconds = 0, longestRunMs = 0;
@@ -49,10 +51,11 @@ Extent extentOf(const BenchmarkRequest& request) {
     if (request.isQuick)
         extent = {.resolutions = {24, 48, 96},
                   .focusPoints = {96},
-                  .warmPoints = {64},
+                  .warmPoints = {},
                   .elements = {2000, 10000, 50000},
                   .bounds = {0.1, 0.05},
                   .elementSamples = {1},
+                  .bricks = {{16, 100}},
                   .variationPoints = 48,
                   .mostRounds = 6,
                   .paperPoints = 128,
@@ -65,10 +68,11 @@ Extent extentOf(const BenchmarkRequest& request) {
     else
         extent = {.resolutions = {32, 64, 128, 256},
                   .focusPoints = {128, 256, 512},
-                  .warmPoints = {64, 128, 256},
+                  .warmPoints = {},
                   .elements = {10000, 30000, 100000, 300000, 1000000},
                   .bounds = {0.1, 0.05, 0.02, 0.01},
                   .elementSamples = {1, 2, 4},
+                  .bricks = {{16, 30}, {16, 300}, {64, 10000}},
                   .variationPoints = 128,
                   .mostRounds = 9,
                   .paperPoints = 512,
@@ -83,6 +87,9 @@ Extent extentOf(const BenchmarkRequest& request) {
         std::sort(extent.resolutions.begin(), extent.resolutions.end());
         extent.variationPoints = extent.resolutions[extent.resolutions.size() / 2];
     }
+    for (const int points : extent.resolutions)
+        if (points >= (request.isQuick ? extent.variationPoints : 64)) extent.warmPoints.push_back(points);
+    if (request.isQuick) extent.warmPoints.resize(1);
     if (request.rounds) extent.mostRounds = *request.rounds;
     if (request.seconds) extent.seconds = *request.seconds;
     return extent;
@@ -119,10 +126,12 @@ class Benchmark {
 
   private:
     void openMeshAndField();
+    int chooseField(const TetMesh& mesh) const;
     void addBrickCases();
     void addElementCases();
     void addWarmCases();
     void addPaperCases();
+    void addYardstick();
     void add(BrickCase bricks, const std::string& ladder, bool isOfElements = false);
     void add(WarmCase warm);
     void addPictures();
@@ -165,26 +174,30 @@ class Benchmark {
 };
 
 void Benchmark::openMeshAndField() {
+    if (request_.gradedElements > 0) {
+        mesh_ = gradedBox(request_.gradedElements);
+        meshName_ = "graded box";
+        say(fmt::format("graded box: {} elements\n", formatCount(mesh_.elementCount())));
+        return;
+    }
     ReadOptions options;
     if (!request_.field.empty()) options.fields = {request_.field};
     MeshFile file = openMesh(request_.mesh, options, job_);
-    const TetMesh& mesh = file.mesh;
-    say(importText(request_.mesh, file.statistics, mesh.boundsWorld()));
-    int field = -1;
-    if (!request_.field.empty())
-        field = selectFields(mesh, {{request_.field, request_.field}}).fields.at(0);
-    else
-        for (std::size_t f = 0; field < 0 && f < mesh.fields.size(); ++f)
-            if (mesh.fields[f].components == 1 && mesh.fields[f].location == FieldLocation::point)
-                field = int(f);
-    if (field < 0)
-        throw InputError(
-            fmt::format("{}: it has no scalar point field; choose one with --field", request_.mesh));
+    say(importText(request_.mesh, file.statistics, file.mesh.boundsWorld()));
+    const int field = chooseField(file.mesh);
     mesh_ = std::move(file.mesh);
     Field only = std::move(mesh_.fields[std::size_t(field)]);
     mesh_.fields.clear();
     mesh_.fields.push_back(std::move(only));
     meshName_ = std::filesystem::path(request_.mesh).filename().string();
+}
+
+/// The field asked for, or the first scalar one of the points.
+int Benchmark::chooseField(const TetMesh& mesh) const {
+    if (!request_.field.empty()) return selectFields(mesh, {{request_.field, request_.field}}).fields.at(0);
+    for (std::size_t f = 0; f < mesh.fields.size(); ++f)
+        if (mesh.fields[f].components == 1 && mesh.fields[f].location == FieldLocation::point) return int(f);
+    throw InputError(fmt::format("{}: it has no scalar point field; choose one with --field", request_.mesh));
 }
 
 void Benchmark::add(BrickCase bricks, const std::string& ladder, bool isOfElements) {
@@ -254,15 +267,15 @@ void Benchmark::add(WarmCase warm) {
 
 void Benchmark::addWarmCases() {
     GlThread* device = this->device();
+    const ElementIndex index(mesh_, job_.execution.withoutProgress());
     for (const BenchmarkVariant& v : list_.variants) {
         const bool isOther = v.bind.primitives == Primitives::processor && v.role == VariantRole::variation;
         if (!isMain(v) && !isOther) continue;
         for (GlThread* to : {static_cast<GlThread*>(nullptr), device}) {
-            if (to == nullptr || device) {
-                add(warmBricks(v, mesh_, 1, to));
-                add(warmBricks(v, mesh_, 4, to));
-                for (const int points : extent_.warmPoints) add(warmCube(v, mesh_, points, to));
-            }
+            for (const auto& [edge, elements] : extent_.bricks)
+                if (auto brick = warmBrick(v, mesh_, index, edge, elements, to)) add(std::move(*brick));
+            add(warmFocus(v, mesh_, to));
+            for (const int points : extent_.warmPoints) add(warmCube(v, mesh_, points, to));
             if (!device) break;
         }
     }
@@ -279,6 +292,17 @@ void Benchmark::addPaperCases() {
     paperAt_ = cases_.size();
     for (TimedCase& one : paper_->timedCases()) cases_.push_back(std::move(one));
     paperCount_ = cases_.size() - paperAt_;
+}
+
+void Benchmark::addYardstick() {
+    TimedCase one;
+    one.what = "yardstick";
+    one.run = [](const Execution& execution) {
+        CaseSample sample;
+        sample.ms = runYardstick(execution.threadCount());
+        return sample;
+    };
+    cases_.push_back(std::move(one));
 }
 
 /// Of the first algorithm's bricks, peers' and those as published; others have the same values.
@@ -306,12 +330,13 @@ void Benchmark::addPictures() {
 
 /// Of the whole program, in processes of its own.
 void Benchmark::addMemory() {
+    if (request_.program.empty() || request_.mesh.empty()) return;
     for (Bricks& one : bricks_) {
         const BenchmarkVariant& v = *one.bricks.variant;
         const bool isWanted =
             isMain(v) && !one.isOfElements && one.bricks.criterion == "uniform" &&
             (!request_.isQuick || one.bricks.refine.resolution == extent_.resolutions.back());
-        if (!isWanted || !cases_[one.at].isTimed() || request_.program.empty()) continue;
+        if (!isWanted || !cases_[one.at].isTimed()) continue;
         one.bricks.peakMemoryBytes =
             peakMemoryOfProgram(request_.program, request_.mesh, mesh_.fields[0], one.bricks, job_.execution);
     }
@@ -386,7 +411,8 @@ Json Benchmark::elementsJson() const {
         if (one.isOfElements && cases_[one.at].isTimed())
             points.push_back({{"variant", one.bricks.variant->name},
                               {"x", one.bricks.mesh->elementCount()},
-                              {"ms", intervalJson(cases_[one.at].interval())}});
+                              {"ms", intervalJson(cases_[one.at].interval())},
+                              {"pairs", pairsOf(cases_[one.at].samples.back().statistics)}});
     return scalingJson(points);
 }
 
@@ -421,6 +447,7 @@ Json Benchmark::run() {
         request_.comparedWith.empty() ? std::nullopt : std::optional(readBenchmark(request_.comparedWith));
     openMeshAndField();
     const int threads = job_.execution.threadCount();
+    if (earlier) checkComparable(*earlier, {{"input", inputJson()}, {"machine", {{"threads", threads}}}});
     list_ = listVariants(request_, threads);
     absent_ = list_.absent;
     std::vector<MachineRates> rates;
@@ -430,6 +457,7 @@ Json Benchmark::run() {
     addElementCases();
     addWarmCases();
     addPaperCases();
+    addYardstick();
     const int rounds = runRounds(cases_,
                                  {.rounds = extent_.mostRounds,
                                   .seed = request_.seed,
@@ -462,6 +490,7 @@ Json Benchmark::run() {
         rooflineJson(document["runs"], document["variants"], meshBytes, mesh_.fields[0].components, rates);
     document["warm"] = warmJsons();
     document["paper"] = paperJson();
+    document["yardstick"] = intervalJson(cases_.back().interval());
     document["absent"] = absent_;
     document["advice"] = adviceOn(document, meshName_);
     if (earlier) document["compared"] = compareBenchmarks(*earlier, document);
@@ -492,7 +521,7 @@ void checkFolder(const BenchmarkRequest& request, const Job& job) {
         outputs.push_back({"--output", (folder / name).string()});
         checkWritable((folder / name).string());
     }
-    checkOutputPaths({request.mesh}, outputs);
+    checkOutputPaths(request.mesh.empty() ? std::vector<std::string>{} : std::vector{request.mesh}, outputs);
 }
 
 }  // namespace

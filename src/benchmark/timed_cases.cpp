@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "base/timer.h"
+#include "resample/statistic_names.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -165,6 +166,11 @@ MedianInterval ratioOf(const TimedCase& first, const TimedCase& second) {
     for (std::size_t i = 0; i < std::min(first.samples.size(), second.samples.size()); ++i)
         ratios.push_back(second.samples[i].ms / first.samples[i].ms);
     return medianInterval(std::move(ratios));
+}
+
+std::int64_t pairsOf(const ResampleStatistics& statistics) {
+    const std::int64_t slices = statistics.count(counted::elementSlicePairs);
+    return slices > 0 ? slices : statistics.count(counted::elementBlockPairs);
 }
 
 CaseSample timed(const std::function<ResampleStatistics()>& work) {

@@ -57,6 +57,9 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
 /// Of two cases that ran in the same rounds: the second's time over the first's, round by round.
 MedianInterval ratioOf(const TimedCase& first, const TimedCase& second);
 
+/// Pairs of an element and a slice that it reaches, or where there are no slices of an element and a block.
+std::int64_t pairsOf(const ResampleStatistics& statistics);
+
 /// Times a piece of work, its processor time too.
 CaseSample timed(const std::function<ResampleStatistics()>& work);
 

@@ -3,17 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/timer.h"
 #include "benchmark/peer_resampler.h"
 #include "compare/sampling_grid.h"
+#include "job/report_text.h"
+#include "reference/random.h"
 #include "resample/statistic_names.h"
 
 namespace tessera {
 
 namespace {
 
-constexpr int kBlockEdge = 64, kBrickEdge = 16, kBrickLattice = 256;
+constexpr int kBlockEdge = 64, kBrickEdge = 16, kBrickLattice = 256, kBricksAtFocus = 4;
+constexpr int kSingleBricks = 16, kTrialsABrick = 200, kLevels = 24;
 
 Lattice latticeOf(const TetMesh& mesh, int points) {
     const Box3d bounds = mesh.boundsWorld();
@@ -28,25 +32,56 @@ WarmCase warmCube(const BenchmarkVariant& variant, const TetMesh& mesh, int poin
     warm.variant = &variant;
     warm.mesh = &mesh;
     warm.name = fmt::format("{}^3", points);
-    warm.lattice = latticeOf(mesh, points);
     const IndexBox all{Vec3i(0), Vec3i(points)};
-    warm.boxes = device ? std::vector{all} : cutIntoBoxes(all, kBlockEdge);
+    warm.parts.push_back(
+        {latticeOf(mesh, points), device ? std::vector{all} : cutIntoBoxes(all, kBlockEdge), nullptr});
     warm.device = device;
     return warm;
 }
 
-WarmCase warmBricks(const BenchmarkVariant& variant, const TetMesh& mesh, int perEdge, GlThread* device) {
+WarmCase warmFocus(const BenchmarkVariant& variant, const TetMesh& mesh, GlThread* device) {
     WarmCase warm;
     warm.variant = &variant;
     warm.mesh = &mesh;
-    warm.name =
-        perEdge == 1 ? "one brick of 16^3" : fmt::format("{} bricks of 16^3", perEdge * perEdge * perEdge);
-    warm.lattice = latticeOf(mesh, kBrickLattice);
-    const Vec3d size = mesh.boundsWorld().size() / warm.lattice.uWorld.x;
-    const Vec3i low = Vec3i(glm::floor(size * (0.5 / kBrickEdge))) * kBrickEdge - perEdge / 2 * kBrickEdge;
-    warm.boxes = cutIntoBoxes({low, low + perEdge * kBrickEdge}, kBrickEdge);
+    warm.name = "64 bricks of 16^3";
+    const Lattice lattice = latticeOf(mesh, kBrickLattice);
+    const Vec3d size = mesh.boundsWorld().size() / lattice.uWorld.x;
+    const Vec3i low = (Vec3i(glm::floor(size * (0.5 / kBrickEdge))) - kBricksAtFocus / 2) * kBrickEdge;
+    warm.parts.push_back(
+        {lattice, cutIntoBoxes({low, low + kBricksAtFocus * kBrickEdge}, kBrickEdge), nullptr});
     warm.device = device;
     return warm;
+}
+
+std::optional<WarmCase> warmBrick(const BenchmarkVariant& variant, const TetMesh& mesh,
+                                  const ElementIndex& index, int edge, int elements, GlThread* device) {
+    WarmCase warm;
+    warm.variant = &variant;
+    warm.mesh = &mesh;
+    warm.name = fmt::format("a brick of {}^3, {} elements", edge, formatCount(elements));
+    warm.device = device;
+    Random random(std::uint64_t(edge) * 7919 + std::uint64_t(elements));
+    const Box3d bounds = index.boundsWorld();
+    const Vec3d size = bounds.size();
+    const double longest = std::max({size.x, size.y, size.z});
+    for (int trial = 0; trial < kTrialsABrick * kSingleBricks && int(warm.parts.size()) < kSingleBricks;
+         ++trial) {
+        const auto& tet = mesh.tets[std::size_t(random.below(int(mesh.elementCount())))];
+        const Vec3d place = mesh.points[std::size_t(tet[0])];
+        const double finest = longest * (0.6 + 0.8 * random.unit()) * std::ldexp(1.0, -kLevels);
+        for (int level = 0; level < kLevels; ++level) {
+            const double h = std::ldexp(finest, level);
+            const Vec3i key(glm::floor((place - bounds.min) / (h * edge)));
+            const IndexBox box{key * edge, key * edge + edge + 1};
+            const double held =
+                double(index.count({bounds.min + h * Vec3d(box.min), bounds.min + h * Vec3d(box.max - 1)}));
+            if (held > 1.4 * elements) break;
+            if (held < elements / 1.4) continue;
+            warm.parts.push_back({Lattice::axisParallel(bounds.min, h), {box}, nullptr});
+            break;
+        }
+    }
+    return warm.parts.empty() ? std::nullopt : std::optional(std::move(warm));
 }
 
 TimedCase timedCase(WarmCase& warm, const std::string& ladder) {
@@ -54,16 +89,23 @@ TimedCase timedCase(WarmCase& warm, const std::string& ladder) {
     one.what = fmt::format("{}, {} {}", warm.variant->name, warm.name,
                            warm.device ? "left on the device" : "into blocks");
     one.ladder = ladder;
-    for (const IndexBox& box : warm.boxes) one.work += double(box.count());
+    for (const WarmCase::Part& part : warm.parts)
+        for (const IndexBox& box : part.boxes) one.work += double(box.count());
     const auto run = [&warm](const Execution& execution) {
         Execution own = execution.withoutProgress();
         own.threads = warm.variant->threads;
         CaseSample sample = timed([&] {
-            return warm.device ? warm.bound->resampleToDevice(warm.lattice, warm.boxes, *warm.slots, own)
-                               : warm.bound->resample(
-                                     warm.lattice, warm.boxes, [](std::size_t, const Block&) {}, own);
+            ResampleStatistics statistics;
+            for (WarmCase::Part& part : warm.parts)
+                statistics += warm.device
+                                  ? warm.bound->resampleToDevice(part.lattice, part.boxes, *part.slots, own)
+                                  : warm.bound->resample(
+                                        part.lattice, part.boxes, [](std::size_t, const Block&) {}, own);
+            return statistics;
         });
-        sample.ms -= sample.statistics.ms(kTransferStage);
+        const auto parts = double(warm.parts.size());
+        sample.ms = (sample.ms - sample.statistics.ms(kTransferStage)) / parts;
+        sample.processorMs /= parts;
         return sample;
     };
     one.run = run;
@@ -72,10 +114,11 @@ TimedCase timedCase(WarmCase& warm, const std::string& ladder) {
         const std::vector<int> fields{0};
         warm.bound = warm.variant->resampler->bind(*warm.mesh, fields, warm.variant->bind);
         warm.bindMs = timer.elapsedMs();
-        if (warm.device)
-            warm.slots = DeviceSamples::make(*warm.device, warm.boxes,
-                                             codingsOf(*warm.mesh, fields, warm.variant->bind.format),
-                                             warm.variant->bind.format);
+        for (WarmCase::Part& part : warm.parts)
+            if (warm.device)
+                part.slots = DeviceSamples::make(*warm.device, part.boxes,
+                                                 codingsOf(*warm.mesh, fields, warm.variant->bind.format),
+                                                 warm.variant->bind.format);
         run(execution);
     };
     return one;
@@ -83,8 +126,9 @@ TimedCase timedCase(WarmCase& warm, const std::string& ladder) {
 
 Json warmJson(const WarmCase& warm, const TimedCase& times) {
     const ResampleStatistics& last = times.samples.back().statistics;
-    const std::int64_t slices = last.count(counted::elementSlicePairs);
-    const std::int64_t pairs = slices > 0 ? slices : last.count(counted::elementBlockPairs);
+    const auto parts = std::int64_t(warm.parts.size());
+    const auto count = [&](std::string_view name) { return last.count(name) / parts; };
+    const std::int64_t pairs = pairsOf(last) / parts;
     const MedianInterval ms = times.interval();
     const bool isOnDevice = warm.variant->resampler->info().isOnDevice;
     Json json{{"variant", warm.variant->name},
@@ -94,14 +138,15 @@ Json warmJson(const WarmCase& warm, const TimedCase& times) {
               {"ms", intervalJson(ms)},
               {"processor_ms", times.medianOf([](const CaseSample& s) { return s.processorMs; })},
               {"render_ms", nullptr},
-              {"upload_bytes", last.count(counted::uploadBytes)},
-              {"read_back_bytes", last.count(counted::readBackBytes)},
-              {"elements_near", last.count(counted::elementsNear)},
+              {"upload_bytes", count(counted::uploadBytes)},
+              {"read_back_bytes", count(counted::readBackBytes)},
+              {"elements_near", count(counted::elementsNear)},
               {"pairs", pairs},
               {"ns_a_pair", pairs > 0 ? Json(ms.median * 1e6 / double(pairs)) : Json(nullptr)}};
     if (isOnDevice)
-        json["render_ms"] =
-            times.medianOf([](const CaseSample& s) { return s.statistics.ms(stage::render); });
+        json["render_ms"] = times.medianOf([](const CaseSample& s) {
+            return s.statistics.ms(stage::render);
+        }) / double(parts);
     return json;
 }
 
