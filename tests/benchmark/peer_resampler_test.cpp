@@ -43,6 +43,10 @@ for line in sys.stdin:
     with open(mesh + ".requests", "a") as log: log.write(line)
     if behaviour == "dies later": print("out of memory", file=sys.stderr); sys.exit(3)
     if behaviour == "hangs": time.sleep(60)
+    if behaviour == "wants volumes" and 1 in request["points"]:
+        open(request["samples"], "w").write("?")
+        print('{"error": "a layer"}', flush=True)
+        continue
     values = array.array("f")
     o, s, n = request["origin"], request["spacing"], request["points"]
     for k in range(n[2]):
@@ -315,6 +319,18 @@ TEST_F(PeerTest, SaysHowItFailed) {
     EXPECT_NE(failure({"fake", "no-such-program"}).find("exit code 127); its standard error ends with"),
               std::string::npos);
     EXPECT_NE(failure({"fake", "kill -SEGV $$;"}).find("but it "), std::string::npos);
+}
+
+TEST_F(PeerTest, AnswersOnAfterAnError) {
+    const TetMesh mesh = unitBox(1);
+    const auto bound = makePeer(fake("wants volumes"))->bind(mesh, everyField(mesh));
+    const auto sample = [&](const IndexBox& box) {
+        bound->resample(
+            kAround, std::span(&box, 1),
+            [](std::size_t, const Block& block) { EXPECT_LT(largestError(block, 0, linear), 1e-6); }, {});
+    };
+    EXPECT_THROW(sample({Vec3i(0), Vec3i(5, 5, 1)}), IoError);
+    sample(kAroundPoints);
 }
 
 TEST_F(PeerTest, OneThatHangsIsEnded) {
