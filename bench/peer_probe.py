@@ -44,7 +44,10 @@ def sample(mesh, request):
     outside = vtk_to_numpy(results.GetArray(probe.GetValidPointMaskArrayName())) == 0
     with open(request["samples"], "wb") as file:
         for field in request["fields"]:
-            values = vtk_to_numpy(results.GetArray(field["name"])).astype("<f4")
+            array = results.GetArray(field["name"])
+            if array is None:
+                raise LookupError(f"the mesh has no field {field['name']}")
+            values = vtk_to_numpy(array).astype("<f4")
             values[outside] = numpy.nan
             file.write(values.tobytes())
     return milliseconds
@@ -59,7 +62,7 @@ def main():
         try:
             say(ms=sample(reader.GetOutput(), json.loads(line)))
         except Exception as error:  # a peer answers whatever happens
-            say(error=f"{type(error).__name__}: {error}")
+            say(error=str(error) or type(error).__name__)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <fstream>
@@ -51,11 +52,26 @@ Points pointsOf(const Json& request) {
     return points;
 }
 
+/// The upper bound from which VTK's division by the steps gives the spacing back, to the last bit where some
+/// double does: on a mesh's surface rounding decides whether a whole layer of points is in the mesh.
+double upperBound(double origin, double spacing, int steps) {
+    constexpr int kNeighbours = 8;
+    const double rounded = origin + steps * spacing;
+    double best = rounded, candidate = rounded;
+    for (int n = 0; n < kNeighbours; ++n) candidate = std::nextafter(candidate, origin);
+    for (int n = 0; n < 2 * kNeighbours; ++n) {
+        const auto distance = [&](double bound) { return std::fabs((bound - origin) / steps - spacing); };
+        if (distance(candidate) < distance(best)) best = candidate;
+        candidate = std::nextafter(candidate, std::numeric_limits<double>::infinity());
+    }
+    return best;
+}
+
 void placeImage(const Points& points, vtkResampleToImage* filter) {
     std::array<double, 6> bounds{};
     for (std::size_t a = 0; a < 3; ++a) {
         bounds[2 * a] = points.origin[a];
-        bounds[2 * a + 1] = points.origin[a] + (points.imageCount(a) - 1) * points.spacing[a];
+        bounds[2 * a + 1] = upperBound(points.origin[a], points.spacing[a], points.imageCount(a) - 1);
     }
     filter->UseInputBoundsOff();
     filter->SetSamplingBounds(bounds.data());

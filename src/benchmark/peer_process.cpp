@@ -58,7 +58,7 @@ PeerProcess::PeerProcess(const PeerCommand& peer, const std::string& meshPath, s
     const nlohmann::ordered_json line = parse(exchange({}, kExpectedTitle, {}), kExpectedTitle);
     const auto title = line.find("peer");
     if (title == line.end() || !title->is_string() || title->get<std::string>().empty())
-        fail(kExpectedTitle, "it said " + messageLine(line.dump(-1, ' ', true)));
+        fail(kExpectedTitle, "it said " + line.dump());
     title_ = messageLine(title->get<std::string>());
 }
 
@@ -86,7 +86,7 @@ void PeerProcess::start(const std::string& meshPath) {
 
 double PeerProcess::ask(const nlohmann::ordered_json& request, const Execution& execution) {
     if (!failure_.empty()) throw IoError(failure_);
-    if (!received_.empty()) fail("silence until the next request", "it said " + messageLine(received_));
+    if (!received_.empty()) fail("silence until the next request", "it said " + received_);
     const Timer timer;
     const std::string text =
         exchange(request.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n",
@@ -94,26 +94,32 @@ double PeerProcess::ask(const nlohmann::ordered_json& request, const Execution& 
     const double elapsedMs = timer.elapsedMs();
     const nlohmann::ordered_json line = parse(text, kExpectedAnswer);
     if (const auto error = line.find("error"); error != line.end())
-        fail("samples",
-             "it answered with the error \"" +
-                 messageLine(error->is_string() ? error->get<std::string>() : error->dump(-1, ' ', true)) +
-                 "\"");
+        throw IoError(
+            sentence("samples", "it answered with the error \"" +
+                                    (error->is_string() ? error->get<std::string>() : error->dump()) + "\"") +
+            lastWords());
     const auto ms = line.find("ms");
     if (ms == line.end()) return elapsedMs;
     const double told = ms->is_number() ? ms->get<double>() : -1;
-    if (!(told >= 0) || !std::isfinite(told)) fail(kExpectedAnswer, "it said " + messageLine(text));
+    if (!(told >= 0) || !std::isfinite(told)) fail(kExpectedAnswer, "it said " + text);
     if (told > elapsedMs * kClockShare + kClockMs)
-        fail("\"ms\" within the " + shortNumber(elapsedMs) + " ms that its answer took",
-             "it said " + messageLine(text));
+        fail("\"ms\" within the " + shortNumber(elapsedMs) + " ms that its answer took", "it said " + text);
     return told;
 }
 
-void PeerProcess::fail(const std::string& expected, const std::string& came) {
-    std::string line = "the peer " + peer_.name + ": expected " + expected + ", but " + came;
-    // Stopped first: it may be about to say more.
-    stop(line);
+std::string PeerProcess::sentence(const std::string& expected, const std::string& came) const {
+    return "the peer " + peer_.name + ": expected " + expected + ", but " + messageLine(came);
+}
+
+std::string PeerProcess::lastWords() const {
     const std::string last = lastLineOf(logPath_);
-    if (!last.empty()) failure_ += "; its standard error ends with \"" + last + "\"";
+    return last.empty() ? last : "; its standard error ends with \"" + last + "\"";
+}
+
+void PeerProcess::fail(const std::string& expected, const std::string& came) {
+    // Stopped first: it may be about to say more.
+    stop(sentence(expected, came));
+    failure_ += lastWords();
     throw IoError(failure_);
 }
 
@@ -130,7 +136,7 @@ nlohmann::ordered_json PeerProcess::parse(const std::string& line, const std::st
     } catch (const std::exception&) {
         // Told as what isn't an object.
     }
-    if (!json.is_object()) fail(expected, "it said " + messageLine(line));
+    if (!json.is_object()) fail(expected, "it said " + line);
     return json;
 }
 

@@ -36,7 +36,7 @@ class PeerProcess {
 
     /// Sends a request and waits for the answer: milliseconds that the peer says its sampling took, or that
     /// passed until its answer where it doesn't say. Throws IoError when it ends, says something else or
-    /// nothing in time, and Cancelled.
+    /// nothing in time, and Cancelled; IoError too when it answers with an error, after which it goes on.
     double ask(const nlohmann::ordered_json& request, const Execution& execution);
 
     /// Stops the peer. Throws IoError: "the peer NAME: expected EXPECTED, but CAME", and what its standard
@@ -51,6 +51,8 @@ class PeerProcess {
     std::optional<std::string> takeLine(const std::string& expected);
     nlohmann::ordered_json parse(const std::string& line, const std::string& expected);
     void stop(const std::string& why);
+    std::string sentence(const std::string& expected, const std::string& came) const;
+    std::string lastWords() const;
 
     PeerCommand peer_;
     std::string logPath_, title_;

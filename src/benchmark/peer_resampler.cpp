@@ -178,6 +178,9 @@ class BoundPeer : public BoundResampler {
                                           {"points", {n.x, n.y, n.z}},
                                           {"threads", execution.threadCount()},
                                           {"samples", samplesPath_}};
+        // A request that failed may have left something.
+        std::error_code ignored;
+        fs::remove(samplesPath_, ignored);
         const double ms = process_->ask(line, execution);
         const PeerSamples samples{request.box, readSamples(std::size_t(request.box.count()))};
         parallelFor(execution, std::int64_t(request.members.size()), [&](std::int64_t m) {

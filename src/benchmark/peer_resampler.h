@@ -26,7 +26,8 @@ inline constexpr std::string_view kPeerRequests = "peer_requests";
 ///
 /// resample() takes axis-parallel lattices alone, else throws InputError. Boxes that fill half of the box
 /// around them are one request; those that don't are parted until they do. Calls wait for one another.
-/// Throws IoError, with the peer's name and its last words, when it fails; Cancelled ends the peer too.
+/// Throws IoError, with the peer's name and its last words, when it fails; later calls then fail with the
+/// same words, but for an error that it answered with. Cancelled ends the peer too.
 std::unique_ptr<const Resampler> makePeer(PeerCommand peer);
 
 /// vtkResampleToImage, when tessera-vtk-peer stands in that folder, the running program's.

@@ -1,0 +1,8 @@
+if(TARGET tessera_benchmark)
+  tessera_test(peer_resampler_test FOLDER benchmark LINK benchmark)
+  target_compile_definitions(peer_resampler_test PRIVATE TESSERA_PYTHON="${TESSERA_PYTHON}")
+  if(TARGET tessera_vtk_peer)
+    target_compile_definitions(peer_resampler_test PRIVATE TESSERA_PROGRAM_FOLDER="$<TARGET_FILE_DIR:tessera_vtk_peer>")
+    add_dependencies(peer_resampler_test tessera_vtk_peer)
+  endif()
+endif()
