@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Whether every algorithm keeps the contract on the device that there is, and how long it takes: device_report.sh [-o DIR]
-# [--target PLATFORM] [options of device_times...]. Runs in a build, and in the archive that scripts/portable.sh makes. Writes
-# DIR/report.txt and DIR/report.json (without -o: device-report); exit code 1 when a test fails.
+# [--target PLATFORM] [options of tessera bench...]. Runs in a build, and in the archive that scripts/portable.sh makes. Writes
+# DIR/report.txt, DIR/report.json and DIR/bench/, the page (without -o: device-report); exit code 1 when a test fails.
 set -uo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 out=device-report target=
@@ -29,7 +29,6 @@ else
   program() {
     case $1 in
       tessera) echo "$build/apps/tessera/tessera" ;;
-      device_times) echo "$build/bench/$1" ;;
       *) echo "$build/tests/$1" ;;
     esac
   }
@@ -54,12 +53,12 @@ for suite in contract_test contract_random_test hard_cases_test raster_{generato
     tee -a "$report"
   suites+="${suites:+, }{\"suite\": \"$suite\", \"state\": \"$state\", \"tests\": ${count:-0}, \"skipped\": ${skipped:-0}}"
 done
-[[ -n $target ]] && options+=(--target "$target")
-"$(program device_times)" "${options[@]}" --json "$out/times.json" 2>&1 | tee -a "$report"
+[[ -n $target ]] && options+=(--gl "$target")
+"$(program tessera)" bench graded:1M -o "$out/bench" --points 64,128,256,512 "${options[@]}" 2>&1 | tee -a "$report"
 ((PIPESTATUS[0] == 0)) || failed=1
 {
-  printf '{"suites": [%s],\n"times": ' "$suites"
-  cat "$out/times.json" 2>/dev/null || echo null
+  printf '{"suites": [%s],\n"bench": ' "$suites"
+  cat "$out/bench/report.json" 2>/dev/null || echo null
   echo '}'
 } >"$out/report.json"
 echo "$report, $out/report.json"

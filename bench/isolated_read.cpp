@@ -21,7 +21,7 @@
 #include "bench_statistics.h"
 #include "mesh_files/read_vtu.h"
 #include "reader/isolated_reader.h"
-#include "vtk_resample.h"
+#include "read_by_vtk.h"
 
 namespace {
 

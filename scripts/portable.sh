@@ -5,12 +5,12 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 out=${1:-build/tessera-portable.tar.xz}
 build=build/release
-[[ -x $build/bench/device_times ]] || scripts/build.sh release
+[[ -x $build/apps/tessera/tessera-vtk-peer ]] || scripts/build.sh release
 stage=$(mktemp -d)
 trap 'rm -rf "$stage"' EXIT
 root=$stage/tessera-portable
 mkdir -p "$root/bin" "$root/lib/own"
-cp $build/apps/tessera/{tessera,tessera_read_mesh} $build/bench/device_times \
+cp $build/apps/tessera/{tessera,tessera_read_mesh,tessera-vtk-peer} \
   $build/tests/{contract_test,contract_random_test,hard_cases_test,raster_{generator,records,run}_test} "$root/bin"
 cp bench/device_report.sh "$root"
 cp -r data LICENSE "$root"

@@ -2,7 +2,7 @@ set(TESSERA_PYTHON /usr/bin/python3 CACHE FILEPATH "Python with Debian's modules
 add_test(NAME layering_test COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/layering_test.py)
 
 if(TARGET tessera)
-  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Programs Refinement Pictures Slices FocusTraces Series Compare Reader Terminal Help Drivers)
+  foreach(suite BadInput Repair Outputs FailingOutputs Interruption Reports Programs Refinement Pictures Slices FocusTraces Series Compare Bench Reader Terminal Help Drivers)
     add_test(NAME app_test.${suite}
       COMMAND ${TESSERA_PYTHON} ${CMAKE_CURRENT_SOURCE_DIR}/app/app_test.py --tessera $<TARGET_FILE:tessera>
               --data ${PROJECT_SOURCE_DIR}/data --broken-drivers ${CMAKE_CURRENT_BINARY_DIR}/broken_driver ${suite})

@@ -289,7 +289,7 @@ std::unique_ptr<const Resampler> makePeer(PeerCommand peer) {
 std::optional<PeerCommand> vtkPeer(const std::string& programFolder) {
     const std::string program = (fs::path(programFolder) / "tessera-vtk-peer").string();
     if (::access(program.c_str(), X_OK) != 0) return std::nullopt;
-    return PeerCommand{"vtk", shellWord(program)};
+    return PeerCommand{"VTK", shellWord(program)};
 }
 
 }  // namespace tessera

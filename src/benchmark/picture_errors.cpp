@@ -1,14 +1,10 @@
 #include "benchmark/picture_errors.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <filesystem>
 
 #include "base/timer.h"
+#include "files/temporary_folder.h"
 #include "job/mesh_source.h"
 #include "job/scene_picture.h"
 #include "job/vdb_source.h"
@@ -38,26 +34,6 @@ Scene sceneOf(const std::string& field, int sizePixels) {
     scene.hasLegend = false;
     return scene;
 }
-
-/// A file that is gone when this ends.
-class TemporaryVdb {
-  public:
-    TemporaryVdb() {
-        static std::atomic<int> number{0};
-        path_ = std::filesystem::temp_directory_path() /
-                fmt::format("tessera_picture_{}_{}.vdb", static_cast<long long>(getpid()), ++number);
-    }
-    ~TemporaryVdb() {
-        std::error_code error;
-        std::filesystem::remove(path_, error);
-    }
-    TemporaryVdb(const TemporaryVdb&) = delete;
-    TemporaryVdb& operator=(const TemporaryVdb&) = delete;
-    std::string path() const { return path_.string(); }
-
-  private:
-    std::filesystem::path path_;
-};
 
 RenderOptions clippedTo(const Box3d& bounds, RenderOptions options) {
     for (int a = 0; a < 3; ++a) {
@@ -141,13 +117,14 @@ PictureErrors PictureReference::measure(const Resampler& resampler, const Refine
         differenceTo(caster.draw(*rays_, picture_->function,
                                  {.layerWorld = picture_->layerWorld, .stepVoxels = kStepVoxels}, execution));
 
-    const TemporaryVdb file;
+    const TemporaryFolder folder("tessera-picture");
+    const std::string path = folder.pathOf("bricks.vdb");
     VdbWriteOptions write;
     write.layers = shape.layers;
-    writeVdb(file.path(), outputs, result, write, execution);
+    writeVdb(path, outputs, result, write, execution);
     Job job;
     job.execution = execution;
-    const auto source = openVdbSource(file.path(), "", {}, pictureThread(), job);
+    const auto source = openVdbSource(path, "", {}, pictureThread(), job);
     const auto draw = [&](const RenderOptions& options) {
         RenderCounts counts;
         RgbaImage image = renderer_->draw(source->pool(), *source->pool().state(), source->frame(),

@@ -509,25 +509,48 @@ Json Benchmark::run() {
     return document;
 }
 
-void checkFolder(const BenchmarkRequest& request, const Job& job) {
-    std::error_code error;
-    const std::filesystem::path folder(request.folder);
-    std::filesystem::create_directories(folder, error);
-    if (error || !std::filesystem::is_directory(folder))
-        throw IoError(fmt::format("{}: the folder can't be made: {}", request.folder,
-                                  error ? error.message() : "something else has that name"));
+/// The folder for the report, made with those above it where they aren't there; what was made is taken away
+/// again when nothing comes of it.
+class ReportFolder {
+  public:
+    explicit ReportFolder(const std::string& name) {
+        std::error_code error;
+        for (std::filesystem::path path = std::filesystem::absolute(name).lexically_normal();
+             !path.empty() && !std::filesystem::exists(path, error) && path != path.parent_path();
+             path = path.parent_path())
+            made_.push_back(path);
+        std::filesystem::create_directories(name, error);
+        if (error || !std::filesystem::is_directory(name))
+            throw IoError(fmt::format("{}: the folder can't be made: {}", name,
+                                      error ? error.message() : "something else has that name"));
+    }
+    ~ReportFolder() {
+        std::error_code error;
+        for (const std::filesystem::path& path : made_) std::filesystem::remove(path, error);  // empty ones
+    }
+    ReportFolder(const ReportFolder&) = delete;
+    ReportFolder& operator=(const ReportFolder&) = delete;
+
+  private:
+    std::vector<std::filesystem::path> made_;  // the innermost first
+};
+
+void checkOutputs(const BenchmarkRequest& request, const Job& job) {
     std::vector<OutputPath> outputs{{"--json", job.reportPath}};
     for (const char* name : {"index.html", "report.json", "runs.csv", "oracle.csv"}) {
-        outputs.push_back({"--output", (folder / name).string()});
-        checkWritable((folder / name).string());
+        outputs.push_back({"--output", (std::filesystem::path(request.folder) / name).string()});
+        checkWritable(outputs.back().path);
     }
-    checkOutputPaths(request.mesh.empty() ? std::vector<std::string>{} : std::vector{request.mesh}, outputs);
+    std::vector<std::string> inputs;
+    if (!request.mesh.empty()) inputs.push_back(request.mesh);
+    checkOutputPaths(inputs, outputs);
 }
 
 }  // namespace
 
 Json runBenchmark(const BenchmarkRequest& request, Job& job) {
-    checkFolder(request, job);
+    const ReportFolder folder(request.folder);
+    checkOutputs(request, job);
     return Benchmark(request, job).run();
 }
 

@@ -1976,24 +1976,84 @@ class Compare(AppTest):
         self.reject(2, "", "compare")
         self.reject(2, "would replace", "compare", self.cube, "--json", "cube.vtu")
 
-    def test_paper_tables_mirror_the_mesh(self):
-        text = self.succeed("paper-tables", self.cube, "--max-size", "128", "--runs", "1", "--json", "tables.json")
-        for word in ("Ael", "Rnd", "ToT", "#Poly", "Weiler", "128 x 64 x 32", "quad cube", "WestM/C"):
-            self.assertIn(word, text)
-        sets = json.loads((self.folder / "tables.json").read_text())["data_sets"]
-        self.assertEqual([s["elements"] for s in sets], [6, 12, 24])
-        self.assertEqual([len(s["grids"]) for s in sets], [1, 2, 2])
-        grid = sets[0]["grids"][0]
-        self.assertEqual(grid["points"], [128, 64, 32])
-        self.assertEqual(grid["published"]["MultiComb"]["tot_s"], 0.69)
-        self.assertEqual(grid["published"]["Software"]["tot_s"], 0.80)
-        self.assertEqual(grid["measured"]["software"]["statistics"]["covered_points"], 128 * 64 * 32)
 
-    def test_paper_tables_need_a_scalar_field(self):
+class Bench(AppTest):
+    """What accuracy costs in time."""
+
+    FAST = ("--quick", "--runs", "2", "--seconds", "1", "--points", "9,17")
+
+    def bench(self, *words):
+        text = self.succeed("bench", self.cube, "-o", "report", *self.FAST, *words)
+        return text, json.loads((self.folder / "report/report.json").read_text())
+
+    def test_every_part_of_the_report_is_there(self):
+        text, report = self.bench("--algorithms", "software,hybrid:processor")
+        self.assertEqual(sorted(p.name for p in (self.folder / "report").iterdir()), ["index.html", "oracle.csv", "report.json", "runs.csv"])
+        self.assertEqual({v["role"] for v in report["variants"]}, {"main", "again", "peer"})
+        runs = report["runs"]
+        self.assertEqual({r["criterion"] for r in runs}, {"uniform", "element size", "error", "focus"})
+        for run in runs:
+            self.assertLessEqual(run["ms"]["low"], run["ms"]["median"])
+            self.assertGreaterEqual(run["ms"]["high"], run["ms"]["median"])
+            self.assertEqual(run["ms"]["count"], 2)
+        # The field is linear: trilinear bricks are exact, up to float.
+        self.assertLess(max(r["error"]["max"] for r in runs), 1e-6)
+        for variant in report["oracle"]["variants"]:
+            self.assertLess(variant["max"], 1e-6, variant)
+            if variant["variant"] != "VTK":
+                self.assertEqual((variant["holes"], variant["spills"]), (0, 0), variant)
+        self.assertEqual({e["bound"] for e in report["equal_error"]}, {0.1, 0.05, 0.02, 0.01})
+        for kind in ("resolution", "elements"):
+            self.assertIn("software", [f["variant"] for f in report["scaling"][kind]])
+        self.assertEqual([len(s["grids"]) for s in report["paper"]["data_sets"]], [1, 2, 2])
+        self.assertEqual([s["elements"] for s in report["paper"]["data_sets"]], [6, 12, 24])
+        grid = report["paper"]["data_sets"][0]["grids"][0]
+        self.assertEqual(grid["published"]["MultiComb"]["tot_s"], 0.69)
+        self.assertIn("software", grid["measured"])
+        self.assertTrue(report["roofline"]["runs"] and report["warm"] and report["advice"] and report["again"])
+        self.assertIn("is the quickest algorithm here", text)
+        rows = (self.folder / "report/runs.csv").read_text().splitlines()
+        self.assertEqual(len(rows), 1 + len(runs))
+
+    def test_errors_are_those_of_an_independent_computation(self):
+        self.succeed("tets", DATA / "disk_out_ref/disk_out_ref.vtu", "-o", "tets.vtu")
+        self.succeed("bench", "tets.vtu", "-o", "report", *self.FAST, "--field", "Temp", "--algorithms", "software,compute", "--no-vtk")
+        script = pathlib.Path(__file__).resolve().parents[2] / "bench/check_oracle.py"
+        done = subprocess.run([sys.executable, script, "tets.vtu", "report"], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn("1000 places, 2 variants: 0 differences", done.stdout)
+
+    def test_two_reports_are_compared(self):
+        _, first = self.bench("--algorithms", "software", "--no-vtk")
+        shutil.copy(self.folder / "report/report.json", self.folder / "old.json")
+        # Every time is a tenth of what it was: this build is slow.
+        for run in first["runs"]:
+            for key in ("median", "low", "high"):
+                run["ms"][key] /= 10
+        for part in [*first["scaling"]["elements"]]:
+            for point in part["points"]:
+                for key in ("median", "low", "high"):
+                    point["ms"][key] /= 10
+        for warm in first["warm"]:
+            for key in ("median", "low", "high"):
+                warm["ms"][key] /= 10
+        (self.folder / "quick.json").write_text(json.dumps(first))
+        text, report = self.bench("--algorithms", "software", "--no-vtk", "--compare", "quick.json")
+        self.assertIn("software got slower", text)
+        self.assertEqual(report["compared"]["algorithms"][0]["verdict"], "slower")
+        self.reject(2, "graded", "bench", "graded:600", "-o", "other", *self.FAST, "--compare", "old.json")
+
+    def test_bad_usage(self):
+        self.reject(2, "required", "bench", self.cube)
+        self.reject(2, "nothing.vtu", "bench", "nothing.vtu", "-o", "report")
+        self.reject(2, "--peer", "bench", self.cube, "-o", "report", "--peer", "probe")
+        self.reject(2, "magic", "bench", self.cube, "-o", "report", "--algorithms", "magic")
+        self.reject(2, "report.json", "bench", self.cube, "-o", "report", "--compare", self.cube)
+        self.write("file", "x")
+        self.reject(1, "file", "bench", self.cube, "-o", "file")
         extra = f'<DataArray type="Float64" Name="v" NumberOfComponents="3" format="ascii">{" ".join(["1"] * 24)}</DataArray>'
         self.write("vector.vtu", vtu_text(fields={}, extra=extra))
-        self.reject(2, "scalar --field", "paper-tables", "vector.vtu")
-        self.reject(2, "", "paper-tables", self.cube, "--max-size", "100")
+        self.reject(2, "scalar --field", "bench", "vector.vtu", "-o", "report")
 
 
 class Reader(AppTest):
@@ -2257,7 +2317,7 @@ class Terminal(AppTest):
         texts = [self.succeed("info", "wide.vtu"), self.succeed("resample", "wide.vtu", "-o", "out.vdb"), self.succeed("info", "out.vdb"),
                  self.succeed("verify", "wide.vtu", "out.vdb"), self.succeed("resample", "wide.vtu", "--dry-run"),
                  self.succeed("compare", "wide.vtu", "--algorithms", "software,software", "--resolution", "20", "--runs", "1"),
-                 self.succeed("paper-tables", "wide.vtu", "--field", "p", "--max-size", "128", "--runs", "1")]  # fmt: skip
+                 self.succeed("bench", "wide.vtu", "-o", "report", "--field", "p", "--algorithms", "software", *Bench.FAST)]  # fmt: skip
         for text in texts:
             for line in text.splitlines():
                 # Sentences are the terminal's to break; rows of tables have gaps between columns.
@@ -2275,7 +2335,7 @@ class Terminal(AppTest):
 
 class Help(AppTest):
     def test_every_command_has_help_with_an_example(self):
-        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["paper-tables"], ["slice"], ["focus-trace"]):
+        for command in ([], ["resample"], ["info"], ["verify"], ["tets"], ["picture"], ["compare"], ["bench"], ["slice"], ["focus-trace"]):
             text = self.succeed(*command, "--help")
             self.assertIn("Example", text)
         self.reject(2, "no command 'resmaple'", "resmaple", "mesh.vtu")
