@@ -124,7 +124,7 @@ Row measure(const Options& options, const PictureReference& reference, Criterion
         std::int64_t(result.tree.leafCount()) * refine.brickCells * refine.brickCells * refine.brickCells;
     row.levels = result.tree.levelCount();
     row.largestError = result.report.fields[0].relativeMax;
-    row.errors = reference.measure(
+    row.errors = reference.measureAll(
         resampler, refine, result,
         fmt::format("{}_{}", criterion == Criterion::error ? "error" : "uniform", budget), execution);
     row.resampleMs = result.times.planMs + result.times.resampleMs + row.errors.extendMs;

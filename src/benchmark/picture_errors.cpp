@@ -101,7 +101,7 @@ PictureDifference PictureReference::differenceTo(const RgbaImage& image) const {
 
 PictureErrors PictureReference::measure(const Resampler& resampler, const RefineOptions& refine,
                                         BrickResult& result, const std::string& name,
-                                        const Execution& execution) const {
+                                        const Execution& execution, bool isAll) const {
     const std::vector<int> fields{0};
     const Field& field = mesh().fields[0];
     PictureErrors errors;
@@ -112,10 +112,13 @@ PictureErrors PictureReference::measure(const Resampler& resampler, const Refine
     shape.layers = 1;
     shapeForFile(mesh(), fields, outputs, resampler, refine.bind, shape, result, execution);
     errors.extendMs = timer.elapsedMs();
-    const RayCaster caster(result.tree, {mesh(), fields, result.tree, result.store, *nearest_}, 0, execution);
-    errors.values =
-        differenceTo(caster.draw(*rays_, picture_->function,
-                                 {.layerWorld = picture_->layerWorld, .stepVoxels = kStepVoxels}, execution));
+    if (isAll) {
+        const RayCaster caster(result.tree, {mesh(), fields, result.tree, result.store, *nearest_}, 0,
+                               execution);
+        errors.values = differenceTo(
+            caster.draw(*rays_, picture_->function,
+                        {.layerWorld = picture_->layerWorld, .stepVoxels = kStepVoxels}, execution));
+    }
 
     const TemporaryFolder folder("tessera-picture");
     const std::string path = folder.pathOf("bricks.vdb");
@@ -132,8 +135,9 @@ PictureErrors PictureReference::measure(const Resampler& resampler, const Refine
         errors.drawMs = counts.drawMs;
         return image;
     };
-    errors.clipped = differenceTo(draw(clippedTo(source_->boundsWorld(), *picture_)));
-    const RgbaImage drawn = draw(*picture_);  // the second time: shaders are made
+    // First, so that shaders are made when the time of drawing counts.
+    if (isAll) errors.clipped = differenceTo(draw(clippedTo(source_->boundsWorld(), *picture_)));
+    const RgbaImage drawn = draw(*picture_);
     errors.drawn = differenceTo(drawn);
     if (keep_) keep_(name, drawn);
     return errors;

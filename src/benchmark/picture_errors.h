@@ -59,11 +59,21 @@ class PictureReference {
     std::int64_t pixelsOfMesh() const { return meshCount_; }
     std::int64_t pixelsInside() const { return insideCount_; }
 
-    /// @param result bricks of mesh(), by `resampler` with these options; their store gets its extension.
-    PictureErrors measure(const Resampler& resampler, const RefineOptions& refine, BrickResult& result,
-                          const std::string& name, const Execution& execution) const;
+    /// As drawn alone. @param result bricks of mesh(), by `resampler` with these options; their store gets
+    /// its extension.
+    PictureErrors measureDrawn(const Resampler& resampler, const RefineOptions& refine, BrickResult& result,
+                               const std::string& name, const Execution& execution) const {
+        return measure(resampler, refine, result, name, execution, false);
+    }
+    /// All of it.
+    PictureErrors measureAll(const Resampler& resampler, const RefineOptions& refine, BrickResult& result,
+                             const std::string& name, const Execution& execution) const {
+        return measure(resampler, refine, result, name, execution, true);
+    }
 
   private:
+    PictureErrors measure(const Resampler& resampler, const RefineOptions& refine, BrickResult& result,
+                          const std::string& name, const Execution& execution, bool isAll) const;
     PictureDifference differenceTo(const RgbaImage& image) const;
 
     Scene scene_;

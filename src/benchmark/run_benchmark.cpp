@@ -60,7 +60,7 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .mostRounds = 6,
                   .paperPoints = 128,
                   .elementsPoints = 48,
-                  .pictureSize = 192,
+                  .pictureSize = 160,
                   .places = 1000,
                   .lattices = 2,
                   .seconds = 24,
@@ -319,7 +319,7 @@ void Benchmark::addPictures() {
             if (!isWanted || one.isOfElements || !cases_[one.at].isTimed()) continue;
             BrickResult result = makeBricks(one.bricks, quiet);
             one.bricks.pictureRms =
-                reference.measure(*v.resampler, one.bricks.refine, result, "", quiet).drawn.all;
+                reference.measureDrawn(*v.resampler, one.bricks.refine, result, "", quiet).drawn.all;
         }
     } catch (const GlError& error) {
         absent_.push_back(fmt::format("No pictures are compared: {}", error.what()));
@@ -450,9 +450,12 @@ Json Benchmark::run() {
     if (earlier) checkComparable(*earlier, {{"input", inputJson()}, {"machine", {{"threads", threads}}}});
     list_ = listVariants(request_, threads);
     absent_ = list_.absent;
+    Json parts = Json::object();  // where the time goes
+    Timer part;
     std::vector<MachineRates> rates;
     for (const int count : std::set<int>{1, threads})
-        rates.push_back(measureMachine(count, request_.isQuick ? 3 : 7));
+        rates.push_back(measureMachine(count, request_.isQuick ? 1 : 7));
+    parts["machine"] = part.restart() / 1000;
     addBrickCases();
     addElementCases();
     addWarmCases();
@@ -466,8 +469,11 @@ Json Benchmark::run() {
                                  job_.execution, [this](const std::string& text) { say(text); });
     for (const TimedCase& one : cases_)
         if (!one.leftOut.empty()) absent_.push_back(one.leftOut);
+    parts["rounds"] = part.restart() / 1000;
     addPictures();
+    parts["pictures"] = part.restart() / 1000;
     addMemory();
+    parts["memory"] = part.restart() / 1000;
 
     Json document = documentHead("bench");
     document["input"] = inputJson();
@@ -482,7 +488,9 @@ Json Benchmark::run() {
     document["scaling"] = {{"resolution", resolutionScalingJson(document["runs"])},
                            {"elements", elementsJson()},
                            {"elements_resolution", extent_.elementsPoints}};
+    part.restart();
     document["oracle"] = oracleJson();
+    parts["oracle"] = part.restart() / 1000;
     const double meshBytes =
         double(mesh_.tets.size() * sizeof mesh_.tets[0] + mesh_.points.size() * sizeof mesh_.points[0] +
                mesh_.fields[0].values.size() * sizeof(double));
@@ -494,11 +502,9 @@ Json Benchmark::run() {
     document["absent"] = absent_;
     document["advice"] = adviceOn(document, meshName_);
     if (earlier) document["compared"] = compareBenchmarks(*earlier, document);
-    document["settings"] = {{"quick", request_.isQuick},
-                            {"rounds", rounds},
-                            {"seconds", timer.elapsedMs() / 1000},
-                            {"resolutions", extent_.resolutions},
-                            {"seed", request_.seed}};
+    document["settings"] = {{"quick", request_.isQuick},           {"rounds", rounds},
+                            {"seconds", timer.elapsedMs() / 1000}, {"seconds_of_parts", std::move(parts)},
+                            {"resolutions", extent_.resolutions},  {"seed", request_.seed}};
 
     say(benchmarkText(document, job_.textWidth));
     writeFile(folder / "oracle.csv", oracleCsv_);
