@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "benchmark/plot_parts.h"
+
+namespace tessera {
+
+/// What a column of a table holds, which decides its side and its class.
+enum class PageCell { words, number, time };
+
+struct TableColumn {
+    std::string heading;
+    PageCell kind = PageCell::number;
+};
+
+/// Cells are text, not yet safe for HTML; empty ones become dashes.
+struct PageTable {
+    std::string caption;
+    std::vector<TableColumn> columns;
+    std::vector<std::vector<std::string>> rows;
+};
+
+std::string tableHtml(const PageTable& table);
+/// Panels side by side where there is room, each for a wide and for a narrow window.
+std::string figureHtml(const PlotFigure& figure);
+std::string paragraphHtml(std::string_view words, std::string_view cssClass = "");
+std::string listHtml(const std::vector<std::string>& items, std::string_view cssClass = "");
+/// Closed until it is opened.
+std::string detailsHtml(std::string_view summary, std::string_view html);
+/// Nothing if its content is empty.
+std::string sectionHtml(std::string_view id, std::string_view heading, std::string_view html);
+/// The whole page. @param body HTML.
+std::string pageHtml(std::string_view title, std::string_view body);
+
+}  // namespace tessera
