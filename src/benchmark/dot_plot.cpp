@@ -17,7 +17,7 @@ constexpr int kPartKinds = kBarKinds;
 double labelColumn(const std::vector<std::string>& labels, const PlotCanvas& canvas) {
     double widest = 40;
     for (const std::string& label : labels) widest = std::max(widest, widthOf(label, canvas.textSize));
-    return std::min(widest, canvas.isNarrow ? 124.0 : 200.0) + 10;
+    return std::min(widest, canvas.isNarrow ? 128.0 : 200.0) + 12;
 }
 
 class DotDrawing {
@@ -43,7 +43,8 @@ class DotDrawing {
 
 std::vector<std::string> rowLabels(const DotPlot& plot) {
     std::vector<std::string> labels;
-    for (const DotRow& row : plot.rows) labels.push_back(row.label);
+    for (const DotRow& row : plot.rows)
+        if (!row.isHeading) labels.push_back(row.label);
     return labels;
 }
 
@@ -87,7 +88,7 @@ void DotDrawing::drawKey() {
 
 void DotDrawing::drawAxis() {
     const double size = canvas_.textSize;
-    for (const AxisTick& tick : x_.ticks(canvas_.isNarrow ? 46 : 58)) {
+    for (const AxisTick& tick : x_.ticksAcross(canvas_.isNarrow ? 40 : 54, size)) {
         svg_ += svgLine(x_.at(tick.value), top_, x_.at(tick.value), bottom_, "g");
         svg_ += svgText(x_.at(tick.value), bottom_ + size + 4, tick.label, TextAnchor::middle, "a");
     }
@@ -107,23 +108,29 @@ std::string DotDrawing::besideMarks(const DotRow& row, double y) const {
     const double size = canvas_.textSize;
     if (row.marks.empty()) return svgText(left_ + 8, y + size * 0.36, row.note, TextAnchor::start, "f");
     double first = right_, last = left_;
-    const DotMark* outermost = nullptr;
+    const DotMark *leftmost = nullptr, *rightmost = nullptr;
     for (const DotMark& mark : row.marks) {
+        if (!leftmost || at(mark.value) < at(leftmost->value)) leftmost = &mark;
+        if (!rightmost || at(mark.value) >= at(rightmost->value)) rightmost = &mark;
         first = std::min({first, at(mark.value), mark.low > 0 ? at(mark.low) : right_});
-        if (at(mark.value) >= last) last = at(mark.value), outermost = &mark;
-        if (mark.high > 0) last = std::max(last, at(mark.high));
+        last = std::max({last, at(mark.value), mark.high > 0 ? at(mark.high) : left_});
     }
-    std::string words = outermost ? outermost->label : "";
-    if (!row.note.empty()) words += (words.empty() ? "" : ", ") + row.note;
-    if (words.empty()) return {};
-    if (last + 10 + widthOf(words, size) < right_)
-        return svgText(last + 10, y + size * 0.36, words, TextAnchor::start, "f");
-    if (first - 10 - widthOf(words, size) > left_)
-        return svgText(first - 10, y + size * 0.36, words, TextAnchor::end, "f");
+    const auto withNote = [&](const std::string& words) {
+        return row.note.empty() ? words : words + (words.empty() ? "" : ", ") + row.note;
+    };
+    const std::string after = withNote(rightmost->label), before = withNote(leftmost->label);
+    if (!after.empty() && last + 10 + widthOf(after, size) < right_)
+        return svgText(last + 10, y + size * 0.36, after, TextAnchor::start, "f");
+    if (!before.empty() && first - 10 - widthOf(before, size) > left_)
+        return svgText(first - 10, y + size * 0.36, before, TextAnchor::end, "f");
     return {};
 }
 
 void DotDrawing::drawRow(const DotRow& row, double y) {
+    if (row.isHeading) {
+        svg_ += svgText(0, y + canvas_.textSize * 0.36 + 2, row.label, TextAnchor::start, "t");
+        return;
+    }
     const std::string shown = fittedTo(row.label, left_ - 10, canvas_.textSize);
     svg_ += fmt::format("<g class=\"{}\">", colourClass(row.style));
     svg_ += svgText(0, y + canvas_.textSize * 0.36, shown, TextAnchor::start, "c");

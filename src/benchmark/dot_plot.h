@@ -23,7 +23,8 @@ struct DotRow {
     std::string label;
     PlotStyle style;
     std::vector<DotMark> marks;
-    std::string note;  ///< in place of marks, or after them
+    std::string note;        ///< in place of marks, or after them
+    bool isHeading = false;  ///< of the rows that follow
 };
 
 /// What a shape stands for.

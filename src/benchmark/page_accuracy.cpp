@@ -23,6 +23,11 @@ namespace {
 constexpr const char* kMeasures[] = {"max", "rms"};
 constexpr int kUniformShape = 0, kAdaptiveShape = 3;
 
+std::string capitalised(std::string words) {
+    if (!words.empty()) words[0] = char(std::toupper(words[0]));
+    return words;
+}
+
 /// What one variant needs for one bound by one criterion.
 struct EqualError {
     const PageVariant* variant = nullptr;
@@ -61,11 +66,11 @@ std::string tipOf(const EqualError& e) {
 
 DotRow equalErrorRow(const PageVariant& variant, const std::vector<EqualError>& all,
                      const std::string& measure, double bound) {
-    DotRow row{variant.name, variant.style, {}, "not measured"};
+    DotRow row{variant.name, variant.style, {}, "not measured", false};
     for (const EqualError& e : all) {
         if (e.variant != &variant || e.measure != measure || e.bound != bound) continue;
         if (!e.time) {
-            if (row.marks.empty()) row.note = "not reached";
+            if (row.marks.empty()) row.note = kNotReached;
             continue;
         }
         const bool isUniform = e.criterion == "uniform";
@@ -114,7 +119,8 @@ PageTable equalErrorTable(const PageSource& source, const std::vector<EqualError
                 for (const EqualError& e : all)
                     if (e.variant == &variant && e.measure == measure && e.criterion == criterion &&
                         e.bound == bound)
-                        row.back() = e.time ? timeText(e.time->median) : "not reached", isKnown = true;
+                        row.back() = e.time ? timeText(e.time->median) : std::string(kNotReached),
+                        isKnown = true;
             }
             if (isKnown) table.rows.push_back(std::move(row));
         }
@@ -164,7 +170,7 @@ PlotStyle criterionStyle(PlotStyle style, const std::string& criterion) {
 XyPlot errorTimePanel(const PageSource& source, const std::string& measure, bool isAdaptive) {
     XyPlot plot;
     plot.title = measureInWords(measure) + (isAdaptive ? ", adaptive grids" : ", uniform grids");
-    plot.title[0] = char(std::toupper(plot.title[0]));
+    plot.title = capitalised(plot.title);
     plot.x = {measureInWords(measure) + "; closer to the right", AxisUnit::share, true, false, {}, {}};
     plot.y = {"time; below is faster", AxisUnit::time, false, false, {}, {}};
     const std::vector<const PageRun*> front = frontOf(source, measure);
@@ -183,11 +189,13 @@ XyPlot errorTimePanel(const PageSource& source, const std::string& measure, bool
                 {run.variant->name, {}, criterionStyle(run.variant->style, run.criterion), {}, true, {}});
             XySeries& added = plot.series.back();
             if (isAdaptive && run.criterion != "error")
-                added.shortLabel = run.variant->name, added.label += ", " + criterionInWords(run.criterion);
+                added.shortLabel = run.criterion,
+                added.label += ", " + (run.isUniform() ? "uniform" : run.criterion);
         }
+        const auto onFront = std::find(front.begin(), front.end(), &run);
+        const int frontNumber = onFront == front.end() ? 0 : int(onFront - front.begin()) + 1;
         plot.series[place->second].points.push_back(
-            {*error, run.time->median, run.time->low, run.time->high, tipOf(run),
-             std::find(front.begin(), front.end(), &run) != front.end()});
+            {*error, run.time->median, run.time->low, run.time->high, tipOf(run), frontNumber});
     }
     for (const PageRun* run : front) plot.front.push_back({*run->error(measure), run->time->median});
     if (plot.series.empty()) plot.front.clear();
@@ -221,14 +229,30 @@ struct SharedCurve {
     std::vector<XyPoint> points;
 };
 
-bool isSameCurve(const std::vector<XyPoint>& a, const std::vector<XyPoint>& b) {
+/// Whether each point of one is one of the other's.
+bool isPartOf(const std::vector<XyPoint>& part, const std::vector<XyPoint>& whole) {
     constexpr double kSame = 0.02;
     const auto near = [](double p, double q) {
         return std::abs(p - q) <= kSame * std::max(std::abs(p), std::abs(q));
     };
-    return a.size() == b.size() &&
-           std::equal(a.begin(), a.end(), b.begin(),
-                      [&](const XyPoint& p, const XyPoint& q) { return near(p.x, q.x) && near(p.y, q.y); });
+    return std::all_of(part.begin(), part.end(), [&](const XyPoint& p) {
+        return std::any_of(whole.begin(), whole.end(),
+                           [&](const XyPoint& q) { return near(p.x, q.x) && near(p.y, q.y); });
+    });
+}
+
+/// Gives a curve's variant to one that is the same as far as both go. Returns whether there is one.
+bool joinsAnother(const SharedCurve& curve, std::vector<SharedCurve>& others) {
+    for (SharedCurve& other : others) {
+        if (other.criterion != curve.criterion) continue;
+        if (isPartOf(other.points, curve.points))
+            other.points = curve.points;
+        else if (!isPartOf(curve.points, other.points))
+            continue;
+        other.variants.push_back(curve.variants.front());
+        return true;
+    }
+    return false;
 }
 
 template <class PlaceOf>
@@ -245,15 +269,9 @@ std::vector<SharedCurve> sharedCurves(const PageSource& source, const PlaceOf& p
             for (const PageRun& run : source.runs())
                 if (run.variant == &variant && run.criterion == criterion)
                     if (const std::optional<std::array<double, 2>> place = placeOf(run))
-                        curve.points.push_back({(*place)[0], (*place)[1], 0, 0, tipOf(run), false});
+                        curve.points.push_back({(*place)[0], (*place)[1], 0, 0, tipOf(run), 0});
             if (curve.points.empty()) continue;
-            const auto same = std::find_if(curves.begin(), curves.end(), [&](const SharedCurve& other) {
-                return other.criterion == criterion && isSameCurve(other.points, curve.points);
-            });
-            if (same == curves.end())
-                curves.push_back(std::move(curve));
-            else
-                same->variants.push_back(&variant);
+            if (!joinsAnother(curve, curves)) curves.push_back(std::move(curve));
         }
     return curves;
 }
@@ -268,11 +286,15 @@ XySeries seriesOf(const SharedCurve& curve, std::size_t ours, int indexOfCriteri
     names.insert(names.end(), peers.begin(), peers.end());
     std::string all = criterion + ": ";
     for (std::size_t i = 0; i < names.size(); ++i) all += (i > 0 ? ", " : "") + names[i];
+    const std::string peerNames = listInWords(peers);
+    const std::string shorter = peers.empty()                  ? criterion
+                                : names.size() == peers.size() ? peerNames
+                                                               : criterion + ", " + peerNames;
     const int shapes[] = {kUniformShape, kAdaptiveShape, 5, 6};
     PlotStyle style{indexOfCriterion % 6, shapes[indexOfCriterion % 4], indexOfCriterion % 4, false, false};
     if (indexInCriterion > 0)
         style.isHollow = true, style.dash = 5, style.colour = peers.empty() ? style.colour : kInkColour;
-    return {all, peers.empty() ? criterion : listInWords(peers), style, curve.points, true, {}};
+    return {all, shorter, style, curve.points, true, {}};
 }
 
 template <class PlaceOf>
@@ -332,7 +354,7 @@ PlotFigure equalErrorFigure(const PageSource& source, const std::string& measure
                      {},
                      {{kUniformShape, true, "uniform grid"}, {kAdaptiveShape, false, "refined by error"}},
                      {}};
-        plot.title[0] = char(std::toupper(plot.title[0]));
+        plot.title = capitalised(plot.title);
         bool isEmpty = true;
         for (const PageVariant& variant : source.variants())
             if (isShownAlways(variant)) {
@@ -362,8 +384,8 @@ std::string equalErrorSection(const PageSource& source) {
         const std::string figure = figureHtml(equalErrorFigure(source, measure));
         if (figure.empty()) continue;
         html += "<h3>" +
-                std::string(measure == std::string("max") ? "Nowhere off by more"
-                                                          : "Off by no more as a rule (RMS)") +
+                std::string(measure == std::string("max") ? "By the largest error"
+                                                          : "By the typical error (RMS)") +
                 "</h3>\n" + paragraphHtml(fastestSentence(all, measure), "says") + figure;
         html += tableHtml(equalErrorTable(source, all, measure, false));
         html += detailsHtml("The same for the variations",
@@ -424,7 +446,7 @@ PlotFigure voxelFigure(const PageSource& source) {
             present);
         if (plot.series.empty()) continue;
         plot.title = measureInWords(measure);
-        plot.title[0] = char(std::toupper(plot.title[0]));
+        plot.title = capitalised(plot.title);
         plot.x = {measureInWords(measure) + "; closer to the right", AxisUnit::share, true, false, {}, {}};
         plot.y = {"voxels; below is less memory", AxisUnit::amount, false, false, {}, {}};
         figure.panels.emplace_back(

@@ -38,17 +38,28 @@ std::string oracleSentence(const PageSource& source) {
             spills += numberOf(partOf(o, "spills")).value_or(0);
     }
     if (most < 0) return {};
-    const std::string places = holes + spills == 0
-                                   ? "No place is missed and none is filled that is outside."
-                                   : fmt::format("{} places are missed and {} are filled that are outside.",
-                                                 wholeText(holes), wholeText(spills));
+    const auto counted = [](double count) {
+        return count == 0 ? std::string("no place") : wholeText(count) + " places";
+    };
+    const std::string places =
+        fmt::format("They miss {} in the mesh and fill {} outside.", counted(holes), counted(spills));
     return fmt::format("Of our algorithms none is further off than {}. {}", percentText(most), places);
+}
+
+/// In the page's order.
+std::vector<const Json*> oracleEntries(const PageSource& source) {
+    std::vector<const Json*> entries;
+    for (const PageVariant& v : source.variants())
+        for (const Json& o : entriesOf(partOf(source.json(), "oracle", "variants")))
+            if (&source.variant(o) == &v && !v.isAgain()) entries.push_back(&o);
+    return entries;
 }
 
 std::string oracleTable(const PageSource& source) {
     PageTable table{
         "", {{"", PageCell::words}, {"largest error"}, {"99.9 % below"}, {"RMS"}, {"holes"}, {"spills"}}, {}};
-    for (const Json& o : entriesOf(partOf(source.json(), "oracle", "variants"))) {
+    for (const Json* entry : oracleEntries(source)) {
+        const Json& o = *entry;
         const auto cell = [&](const char* key, std::string (*text)(double)) {
             const auto value = numberOf(partOf(o, key));
             return value ? text(*value) : std::string();
@@ -77,18 +88,18 @@ std::optional<double> softwareSeconds(const Json& grid) {
 
 /// How many times as fast as software, here and in the paper.
 std::vector<DotRow> speedUpRows(const PageSource& source, const Json& grid) {
-    std::vector<DotRow> rows;
+    std::vector<DotRow> rows{{gridInWords(partOf(grid, "points")) + " points", {}, {}, "", true}};
     const std::string points = gridInWords(partOf(grid, "points"));
     const auto rowOf = [&](const std::string& name) -> DotRow& {
-        const std::string label = name + " " + points;
         for (DotRow& row : rows)
-            if (row.label == label) return row;
+            if (row.label == name) return row;
         const auto v = std::find_if(source.variants().begin(), source.variants().end(),
                                     [&](const PageVariant& other) { return other.name == name; });
         rows.push_back({label,
                         v == source.variants().end() ? PlotStyle{kInkColour, 0, 0, false, false} : v->style,
                         {},
-                        ""});
+                        "",
+                        false});
         return rows.back();
     };
     const Json& measured = partOf(grid, "measured");
@@ -112,7 +123,7 @@ std::vector<DotRow> speedUpRows(const PageSource& source, const Json& grid) {
                                               timeText(*seconds * 1e3), timeText(*software * 1e3)),
                                   timesText(*software / *seconds)});
         }
-    return rows;
+    return rows.size() > 1 ? rows : std::vector<DotRow>();
 }
 
 std::string secondsCell(const Json& json) {
@@ -125,7 +136,7 @@ std::string msCell(const Json& json) {
     return ms ? timeText(*ms) : "";
 }
 
-PageTable paperTable(const Json& set) {
+PageTable paperStagesTable(const Json& set) {
     const auto elements = numberOf(partOf(set, "elements")),
                publishedK = numberOf(partOf(set, "published_elements_k"));
     std::string caption = wordsOf(partOf(set, "name"));
@@ -164,6 +175,43 @@ PageTable paperTable(const Json& set) {
                      secondsCell(partOf(p, "ael_s")), secondsCell(partOf(p, "rnd_s")), "",
                      secondsCell(partOf(p, "tot_s")), polygons ? wholeText(*polygons * 1e3) : ""});
             }
+    }
+    return table;
+}
+
+/// The whole times here and in the paper, of those that do the same.
+PageTable paperTable(const Json& set) {
+    PageTable table{wordsOf(partOf(set, "name")),
+                    {{"grid", PageCell::words},
+                     {"", PageCell::words},
+                     {"here"},
+                     {"over software"},
+                     {"in the paper", PageCell::words},
+                     {"published"},
+                     {"over software"}},
+                    {}};
+    const auto speedUp = [](std::optional<double> software, std::optional<double> time) {
+        return software && time && *time > 0 ? timesText(*software / *time) : std::string();
+    };
+    for (const Json& grid : entriesOf(partOf(set, "grids"))) {
+        const Json& measured = partOf(grid, "measured");
+        const Json& published = partOf(grid, "published");
+        const auto rowOf = [&](const std::string& name, const std::string& paperName, const Json& p) {
+            const auto ms = numberOf(partOf(measured, name, "total_ms")),
+                       seconds = numberOf(partOf(p, "tot_s"));
+            table.rows.push_back({gridInWords(partOf(grid, "points")), name, ms ? timeText(*ms) : "",
+                                  speedUp(softwareMs(grid), ms), paperName, secondsCell(partOf(p, "tot_s")),
+                                  speedUp(softwareSeconds(grid), seconds)});
+        };
+        std::vector<std::string> paired;
+        if (published.is_object())
+            for (const auto& [paperName, p] : published.items()) {
+                paired.push_back(wordsOf(partOf(p, "algorithm")));
+                rowOf(paired.back(), paperName, p);
+            }
+        if (measured.is_object())
+            for (const auto& [name, m] : measured.items())
+                if (std::find(paired.begin(), paired.end(), name) == paired.end()) rowOf(name, "", {});
     }
     return table;
 }
@@ -278,12 +326,9 @@ std::string runsTable(const PageSource& source) {
         table.rows.push_back({run.variant->name, criterionInWords(run.criterion), run.asked,
                               cell("levels", wholeText), cell("voxels", wholeText),
                               cell("covered", wholeText), run.time ? timeText(run.time->median) : "",
-                              run.time && run.time->low != run.time->high
-                                  ? timeText(run.time->low) + " to " + timeText(run.time->high)
-                                  : "",
-                              cell("processor_ms", timeText), cell("peak_memory_bytes", bytesText),
-                              errorCell("max"), errorCell("p999"), errorCell("rms"),
-                              run.pictureRms ? threeDigits(*run.pictureRms) : ""});
+                              run.time ? rangeText(*run.time) : "", cell("processor_ms", timeText),
+                              cell("peak_memory_bytes", bytesText), errorCell("max"), errorCell("p999"),
+                              errorCell("rms"), run.pictureRms ? threeDigits(*run.pictureRms) : ""});
     }
     return tableHtml(table);
 }
@@ -304,21 +349,19 @@ PlotFigure oracleFigure(const PageSource& source) {
         bool isHollow;
     };
     bool isEmpty = true;
-    for (const PageVariant& v : source.variants())
-        for (const Json& o : entriesOf(partOf(source.json(), "oracle", "variants"))) {
-            if (&source.variant(o) != &v || v.isAgain()) continue;
-            DotRow row{v.name, v.style, {}, ""};
-            for (const Measure& m :
-                 {Measure{"rms", "RMS", kSquare, false}, Measure{"p999", "99.9 % below", kDiamond, true},
-                  Measure{"max", "largest", kCircle, false}})
-                if (const auto error = numberOf(partOf(o, m.key)))
-                    row.marks.push_back({*error, 0, 0, m.shape, m.isHollow,
-                                         fmt::format("{}, {}: {}", v.name, m.words, percentText(*error)),
-                                         ""});
-            if (row.marks.empty()) row.note = "not measured";
-            isEmpty = isEmpty && row.marks.empty();
-            plot.rows.push_back(std::move(row));
-        }
+    for (const Json* o : oracleEntries(source)) {
+        const PageVariant& v = source.variant(*o);
+        DotRow row{v.name, v.style, {}, "", false};
+        for (const Measure& m :
+             {Measure{"rms", "RMS", kSquare, false}, Measure{"p999", "99.9 % below", kDiamond, true},
+              Measure{"max", "largest", kCircle, false}})
+            if (const auto error = numberOf(partOf(*o, m.key)))
+                row.marks.push_back({*error, 0, 0, m.shape, m.isHollow,
+                                     fmt::format("{}, {}: {}", v.name, m.words, percentText(*error)), ""});
+        if (row.marks.empty()) row.note = "not measured";
+        isEmpty = isEmpty && row.marks.empty();
+        plot.rows.push_back(std::move(row));
+    }
     if (isEmpty) return figure;
     figure.note = source.missingPeers(labelsOf(plot));
     addPanel(figure, std::move(plot));
@@ -341,7 +384,7 @@ std::string exactnessSection(const PageSource& source) {
                 ". What is exact comes from arithmetic without rounding. A hole is a place in the mesh that "
                 "is left empty, "
                 "a spill a place outside that is filled. No error at all stands in the lane at the left.") +
-            paragraphHtml(oracleSentence(source), "says") + oracle + oracleTable(source);
+            paragraphHtml(oracleSentence(source), "says") + besideHtml(oracle, oracleTable(source));
     }
     if (!picture.empty())
         html += "<h3>In pictures</h3>\n" +
@@ -383,9 +426,9 @@ PlotFigure paperFigure(const PageSource& source) {
 
 std::string paperSection(const PageSource& source) {
     const std::string figure = figureHtml(paperFigure(source));
-    std::string tables;
+    std::string tables, stages;
     for (const Json& set : entriesOf(partOf(source.json(), "paper", "data_sets")))
-        tables += tableHtml(paperTable(set));
+        tables += tableHtml(paperTable(set)), stages += tableHtml(paperStagesTable(set));
     if (figure.empty() && tables.empty()) return {};
     return sectionHtml(
         "paper", "Beside the paper's tables",
@@ -393,8 +436,9 @@ std::string paperSection(const PageSource& source) {
             "The grids of the paper that the algorithms come from. The machines are decades apart, so "
             "compare each with "
             "software on the same machine: to the right of the dashed line it is faster than that.") +
-            figure + paragraphHtml(wordsOf(partOf(source.json(), "paper", "legend")), "soft") +
-            detailsHtml("All tables", tables));
+            figure + tables +
+            detailsHtml("All stages of all of them",
+                        paragraphHtml(wordsOf(partOf(source.json(), "paper", "legend")), "soft") + stages));
 }
 
 PlotFigure noiseFigure(const PageSource& source) {
@@ -415,7 +459,8 @@ PlotFigure noiseFigure(const PageSource& source) {
                                fmt::format("{}: {} ({} to {})", asked, threeDigits(ratio->median),
                                            threeDigits(ratio->low), threeDigits(ratio->high)),
                                threeDigits(ratio->median)}},
-                             agrees ? "" : "differs"});
+                             agrees ? "" : "differs",
+                             false});
     }
     if (plot.rows.empty()) return figure;
     if (const std::vector<std::string> peers = source.peers(); !peers.empty())

@@ -28,7 +28,8 @@ a { color: var(--k0); }
 figure { margin: 1rem 0; }
 .panels { display: grid; grid-template-columns: minmax(0, 1fr); gap: 1.75rem 2rem; }
 svg { display: block; width: 100%; height: auto; overflow: visible; }
-.wide { display: none; max-width: 50rem; }
+.wide { display: none; max-width: 44rem; }
+.beside { display: grid; grid-template-columns: minmax(0, 1fr); gap: 0 2.5rem; }
 .narrow { max-width: 30rem; }
 .scroll { overflow-x: auto; margin: .75rem 0; max-width: 100%; }
 table { border-collapse: collapse; font-size: .87rem; font-variant-numeric: tabular-nums; }
@@ -36,6 +37,7 @@ caption { text-align: left; font-weight: 600; padding: .25rem 0; }
 th, td { padding: .25rem .6rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--grid); }
 th { vertical-align: bottom; font-weight: 600; color: var(--soft); }
 td.w, th.w { text-align: left; }
+td.none { color: var(--soft); }
 td:first-child, th:first-child { padding-left: 0; }
 tbody tr:hover { background: var(--panel); }
 details { margin: .75rem 0; }
@@ -43,10 +45,11 @@ summary { cursor: pointer; color: var(--k0); padding: .25rem 0; }
 dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .2rem 1rem; max-width: 60rem; font-size: .92rem; }
 dt { color: var(--soft); }
 dd { margin: 0; overflow-wrap: anywhere; }
-.front { columns: 22rem; max-width: none; font-size: .92rem; }
+.front { columns: 23rem; column-gap: 2rem; max-width: none; font-size: .92rem; }
 @media (min-width: 44rem) { .wide { display: block; } .narrow { display: none; } main { padding: 1rem 2rem 4rem; } }
-@media (min-width: 66rem) { .panels.many { grid-template-columns: repeat(2, minmax(0, 1fr)); } }
-@media (min-width: 130rem) { html { font-size: 20px; } .wide { max-width: none; } .panels:not(.many) .wide { max-width: 56rem; } }
+@media screen and (min-width: 66rem) { .beside { grid-template-columns: minmax(0, 1.1fr) minmax(0, 1fr); } .beside .scroll { margin-top: 1rem; }
+  .panels.many { grid-template-columns: repeat(2, minmax(0, 1fr)); } }
+@media (min-width: 130rem) { html { font-size: 20px; } .wide { max-width: none; } .panels:not(.many) .wide { max-width: 44rem; } }
 )";
 
 constexpr const char* kPrintStyle = R"(
@@ -84,7 +87,8 @@ std::string tableHtml(const PageTable& table) {
     for (const auto& row : table.rows) {
         html += "<tr>";
         for (std::size_t i = 0; i < row.size() && i < table.columns.size(); ++i)
-            html += fmt::format("<td{}>{}</td>", classOf(table.columns[i].kind),
+            html += fmt::format("<td{}>{}</td>",
+                                row[i] == kNotReached ? " class=\"none\"" : classOf(table.columns[i].kind),
                                 row[i].empty() ? "&ndash;" : inHtml(row[i]));
         html += "</tr>\n";
     }
@@ -101,6 +105,11 @@ std::string figureHtml(const PlotFigure& figure) {
     html += "</div>\n";
     if (!figure.note.empty()) html += fmt::format("<figcaption>{}</figcaption>\n", inHtml(figure.note));
     return html + "</figure>\n";
+}
+
+std::string besideHtml(const std::string& figure, const std::string& table) {
+    if (figure.empty() || table.empty()) return figure + table;
+    return "<div class=\"beside\">\n<div>" + figure + "</div>\n<div>" + table + "</div>\n</div>\n";
 }
 
 std::string paragraphHtml(std::string_view words, std::string_view cssClass) {

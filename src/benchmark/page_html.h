@@ -16,6 +16,9 @@ struct TableColumn {
     PageCell kind = PageCell::number;
 };
 
+/// A cell that says that there is no such time.
+inline constexpr std::string_view kNotReached = "not reached";
+
 /// Cells are text, not yet safe for HTML; empty ones become dashes.
 struct PageTable {
     std::string caption;
@@ -28,6 +31,8 @@ std::string tableHtml(const PageTable& table);
 std::string figureHtml(const PlotFigure& figure);
 std::string paragraphHtml(std::string_view words, std::string_view cssClass = "");
 std::string listHtml(const std::vector<std::string>& items, std::string_view cssClass = "");
+/// A figure and its table, side by side where there is room.
+std::string besideHtml(const std::string& figure, const std::string& table);
 /// Closed until it is opened.
 std::string detailsHtml(std::string_view summary, std::string_view html);
 /// Nothing if its content is empty.

@@ -30,10 +30,22 @@ std::string wholeText(double value) {
     return text;
 }
 
+std::string asPower(double value, int digits) {
+    constexpr const char* kRaised[] = {"\u2070", "\u00b9", "\u00b2", "\u00b3", "\u2074",
+                                       "\u2075", "\u2076", "\u2077", "\u2078", "\u2079"};
+    const std::string text = fmt::format("{:.{}e}", value, digits - 1);
+    const std::size_t e = text.find('e');
+    const int power = std::stoi(text.substr(e + 1));
+    std::string raised = power < 0 ? "\u207b" : "";
+    for (const char c : std::to_string(std::abs(power))) raised += kRaised[c - '0'];
+    const std::string factor = text.substr(0, e);
+    return (factor == "1" ? "" : factor + "\u00b7") + "10" + raised;
+}
+
 std::string threeDigits(double value) {
     const double size = std::abs(value);
     if (size == 0) return "0";
-    if (size < 1e-4 || size >= 1e12) return fmt::format("{:.2e}", value);
+    if (size < 1e-3 || size >= 1e12) return asPower(value, 3);
     const double power = std::floor(std::log10(size)) - 2;
     const double rounded = std::round(value / std::pow(10, power)) * std::pow(10, power);
     if (power >= 0) return wholeText(rounded);
@@ -51,9 +63,18 @@ std::string timeText(double ms) {
     return withUnit(threeDigits(ms / 1e3), "s");
 }
 
+std::string rangeText(const PageTime& time) {
+    if (time.low == time.high) return {};
+    std::string low = timeText(time.low);
+    const std::string high = timeText(time.high);
+    const std::size_t unit = low.rfind(kThinSpace), highUnit = high.rfind(kThinSpace);
+    if (low.substr(unit) == high.substr(highUnit)) low.resize(unit);
+    return low + " to " + high;
+}
+
 std::string intervalText(const PageTime& time) {
-    if (time.low == time.high) return timeText(time.median);
-    return fmt::format("{} ({} to {})", timeText(time.median), timeText(time.low), timeText(time.high));
+    const std::string range = rangeText(time);
+    return range.empty() ? timeText(time.median) : fmt::format("{} ({})", timeText(time.median), range);
 }
 
 std::string percentText(double share) {

@@ -13,11 +13,15 @@ inline constexpr const char* kThinSpace = "\u202f";
 
 // Numbers for reading, of three digits, in UTF-8.
 std::string threeDigits(double value);
+/// 0.0000012 -> "1.2" and ten to the power of -6, in small figures above the line.
+std::string asPower(double value, int digits);
 /// 1234567 -> "1 234 567", with thin spaces.
 std::string wholeText(double value);
 /// From nanoseconds to seconds.
 std::string timeText(double ms);
-/// "1.2 ms (1.1 to 1.3)"; without the interval where it is a point.
+/// "1.10 to 1.30 ms"; empty where it is a point.
+std::string rangeText(const PageTime& time);
+/// "1.20 ms (1.10 to 1.30 ms)"; without the interval where it is a point.
 std::string intervalText(const PageTime& time);
 /// 0.02 -> "2.00 %"; zero is "0".
 std::string percentText(double share);

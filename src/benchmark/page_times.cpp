@@ -52,7 +52,7 @@ XySeries growthSeries(const Growth& growth, const std::string& unit) {
     for (const auto& [x, time] : growth.points) {
         series.points.push_back({x, time.median, time.low, time.high,
                                  fmt::format("{}, {} {}: {}", v.name, wholeText(x), unit, intervalText(time)),
-                                 false});
+                                 0});
         least = std::min(least, x), most = std::max(most, x);
     }
     if (growth.exponent && growth.factorMs && most > least)
@@ -72,7 +72,7 @@ void addUnfitted(const PageSource& source, XyPlot& plot) {
             if (run.variant == &v && run.isUniform() && run.resolution && run.time)
                 series.points.push_back(
                     {*run.resolution, run.time->median, run.time->low, run.time->high,
-                     fmt::format("{}, {}: {}", v.name, run.asked, intervalText(*run.time)), false});
+                     fmt::format("{}, {}: {}", v.name, run.asked, intervalText(*run.time)), 0});
         if (!series.points.empty()) plot.series.push_back(std::move(series));
     }
 }
@@ -103,9 +103,8 @@ std::string growthTable(const std::vector<Growth>& all, const std::string& twice
     PageTable table{"", {{"", PageCell::words}, {"power"}, {"95 % interval"}, {twice}, {"points"}}, {}};
     for (const Growth& g : all) {
         if (!g.exponent) continue;
-        const std::string interval =
-            g.low && g.high ? fmt::format("{} to {}", threeDigits(*g.low), threeDigits(*g.high)) : "";
-        table.rows.push_back({g.variant->name, threeDigits(*g.exponent), interval,
+        const std::string interval = g.low && g.high ? fmt::format("{:.2f} to {:.2f}", *g.low, *g.high) : "";
+        table.rows.push_back({g.variant->name, fmt::format("{:.2f}", *g.exponent), interval,
                               timesText(std::pow(2, *g.exponent)) + " as long",
                               std::to_string(g.points.size())});
     }
@@ -277,6 +276,17 @@ std::string rooflineSentence(const PageSource& source) {
                        timesText(*numberOf(partOf(*best, "times_least"))));
 }
 
+/// "64^3" with a raised 3.
+std::string caseInWords(const std::string& words) {
+    std::string raised;
+    for (std::size_t i = 0; i < words.size(); ++i)
+        if (words.compare(i, 2, "^3") == 0)
+            raised += "\u00b3", ++i;
+        else
+            raised += words[i];
+    return raised;
+}
+
 }  // namespace
 
 PlotFigure scalingFigure(const PageSource& source, const std::string& axis) {
@@ -323,8 +333,8 @@ std::string scalingSection(const PageSource& source, const std::string& axis) {
         paragraphHtml(how) +
             paragraphHtml(growthSentence(growths, isResolution ? "points along each side" : "elements"),
                           "says") +
-            figure +
-            growthTable(growths, isResolution ? "for twice the points a side" : "for twice the elements"));
+            besideHtml(figure, growthTable(growths, isResolution ? "for twice the points a side"
+                                                                 : "for twice the elements")));
 }
 
 PlotFigure stagesFigure(const PageSource& source) {
@@ -375,7 +385,7 @@ PlotFigure rooflineFigure(const PageSource& source) {
             series.points.push_back({*resolution, *times, 0, 0,
                                      fmt::format("{}, {} points: {} the least", v.name,
                                                  wholeText(*resolution), timesText(*times)),
-                                     false});
+                                     0});
         }
         if (!series.points.empty()) plot.series.push_back(std::move(series));
     }
@@ -400,7 +410,7 @@ std::string rooflineSection(const PageSource& source) {
                        paragraphHtml("The mesh has to be read and the voxels have to be written once. What "
                                      "this machine's memory needs for "
                                      "that alone is the dashed line; nothing can be below it.") +
-                           paragraphHtml(rooflineSentence(source), "says") + figure + rates +
+                           paragraphHtml(rooflineSentence(source), "says") + besideHtml(figure, rates) +
                            detailsHtml("All of it in figures", rooflineTable(source)));
 }
 
@@ -426,14 +436,13 @@ std::string warmSection(const PageSource& source) {
         };
         const auto time = pageTimeOf(partOf(w, "ms"));
         const auto perPair = numberOf(partOf(w, "ns_a_pair"));
-        table.rows.push_back(
-            {source.variant(w).name, wordsOf(partOf(w, "case")),
-             wordsOf(partOf(w, "to")) == "device" ? "on the device" : "in blocks",
-             time ? timeText(time->median) : "",
-             time && time->low != time->high ? timeText(time->low) + " to " + timeText(time->high) : "",
-             cell("bind_ms", timeText), cell("render_ms", timeText), cell("processor_ms", timeText),
-             cell("upload_bytes", bytesText), cell("read_back_bytes", bytesText), cell("pairs", wholeText),
-             perPair ? timeText(*perPair * 1e-6) : ""});
+        table.rows.push_back({source.variant(w).name, caseInWords(wordsOf(partOf(w, "case"))),
+                              wordsOf(partOf(w, "to")) == "device" ? "on the device" : "in blocks",
+                              time ? timeText(time->median) : "", time ? rangeText(*time) : "",
+                              cell("bind_ms", timeText), cell("render_ms", timeText),
+                              cell("processor_ms", timeText), cell("upload_bytes", bytesText),
+                              cell("read_back_bytes", bytesText), cell("pairs", wholeText),
+                              perPair ? timeText(*perPair * 1e-6) : ""});
     }
     const std::string html = tableHtml(table);
     if (html.empty()) return {};

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "benchmark/page_numbers.h"
+#include "benchmark/plot_parts.h"
 
 namespace tessera {
 
@@ -73,6 +74,17 @@ std::vector<AxisTick> PlotAxis::ticks(double room) const {
     return ticks;
 }
 
+std::vector<AxisTick> PlotAxis::ticksAcross(double room, double textSize) const {
+    std::vector<AxisTick> apart;
+    for (AxisTick& tick : ticks(room)) {
+        const double width = widthOf(tick.label, textSize);
+        const bool hasRoom = apart.empty() || std::abs(at(tick.value) - at(apart.back().value)) >=
+                                                  (width + widthOf(apart.back().label, textSize)) / 2 + 6;
+        if (hasRoom) apart.push_back(std::move(tick));
+    }
+    return apart;
+}
+
 std::string tickText(AxisUnit unit, double value) {
     const auto with = [](double number, const char* name) {
         return fmt::format("{:.4g}{}{}", number, kThinSpace, name);
@@ -83,13 +95,13 @@ std::string tickText(AxisUnit unit, double value) {
             if (value >= 1) return with(value, "ms");
             return value >= 1e-3 ? with(value * 1e3, "\u00b5s") : with(value * 1e6, "ns");
         case AxisUnit::share:
-            return value != 0 && value < 1e-5 ? fmt::format("{:.0e}{}%", value * 100, kThinSpace)
-                                              : with(value * 100, "%");
+            if (value > 0 && value < 1e-5) return asPower(value * 100, 1) + kThinSpace + "%";
+            return with(value * 100, "%");
         case AxisUnit::amount:
             if (value >= 1e9) return with(value / 1e9, "bn");
             return value >= 1e6 ? with(value / 1e6, "M") : wholeText(value);
         case AxisUnit::times:
-            return fmt::format("{:.4g}\u00d7", value);
+            return (value >= 1e4 ? wholeText(value) : fmt::format("{:.4g}", value)) + "\u00d7";
         case AxisUnit::plain:
             break;
     }

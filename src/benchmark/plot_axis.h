@@ -42,6 +42,8 @@ class PlotAxis {
     bool holds(double value) const { return std::isfinite(value) && (isLinear_ || value > 0); }
     /// @param room pixels from one label's middle to the next, at least.
     std::vector<AxisTick> ticks(double room) const;
+    /// The same for labels side by side.
+    std::vector<AxisTick> ticksAcross(double room, double textSize) const;
 
   private:
     double scaled(double value) const { return isLinear_ ? value : std::log10(value); }

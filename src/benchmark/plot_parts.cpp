@@ -77,7 +77,8 @@ std::string plotRules(PlotColours colours) {
         css += rule(fmt::format(".s{}", i),
                     "fill:" + (fixed ? kParts[i].onWhite : fmt::format("var(--s{})", i)));
     css += rule(".kf", "color:" + named("faint"));
-    css += rule("text.c", "fill:currentColor") + rule("text.t", "font-weight:600");
+    css += rule("text.c", "fill:currentColor") + rule(".kf text.c", "fill:" + named("soft")) +
+           rule("text.t", "font-weight:600");
     css += rule("text.a", "fill:" + named("soft")) + rule("text.f", "fill:" + named("soft"));
     css += rule(".g", "stroke:" + named("grid")) + rule(".x", "fill:none;stroke:" + named("soft"));
     css += rule(".r", "stroke:" + named("ink") + ";stroke-width:1.5;stroke-dasharray:7 4");
@@ -168,7 +169,7 @@ double widthOf(std::string_view words, double textSize) {
 }
 
 std::string fittedTo(const std::string& words, double pixels, double textSize) {
-    return shortenedTo(words, std::size_t(std::max(pixels / (textSize * 0.59), 2.0)));
+    return shortenedTo(words, std::size_t(std::max(pixels / (textSize * 0.59) + 0.01, 2.0)));
 }
 
 std::vector<double> spreadApart(const std::vector<double>& wanted, double gap, double low, double high) {

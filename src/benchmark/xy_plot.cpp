@@ -13,7 +13,7 @@ namespace tessera {
 namespace {
 
 constexpr double kMarkReach = 6;  // from the middle of a mark to its edge
-constexpr double kLongestLabel = 205, kLongestNarrowLabel = 112;
+constexpr double kLongestLabel = 180, kLongestNarrowLabel = 112;
 
 /// The name of a curve beside its end.
 struct EndLabel {
@@ -82,11 +82,11 @@ void XyDrawing::drawAxes() {
     const double size = canvas_.textSize;
     if (!plot_.title.empty()) svg_ += svgText(0, size + 1, plot_.title, TextAnchor::start, "t");
     svg_ += svgText(0, top_ - 9, plot_.y.title, TextAnchor::start, "a");
-    for (const AxisTick& tick : y_.ticks(26)) {
+    for (const AxisTick& tick : y_.ticks(canvas_.isNarrow ? 26 : 30)) {
         svg_ += svgLine(left_, y_.at(tick.value), right_, y_.at(tick.value), "g");
         svg_ += svgText(left_ - 6, y_.at(tick.value) + size * 0.36, tick.label, TextAnchor::end, "a");
     }
-    for (const AxisTick& tick : x_.ticks(canvas_.isNarrow ? 44 : 54)) {
+    for (const AxisTick& tick : x_.ticksAcross(canvas_.isNarrow ? 40 : 54, size)) {
         svg_ += svgLine(x_.at(tick.value), top_, x_.at(tick.value), bottom_, "g");
         svg_ += svgText(x_.at(tick.value), bottom_ + size + 5, tick.label, TextAnchor::middle, "a");
     }
@@ -106,16 +106,17 @@ void XyDrawing::drawFront() {
 
 void XyDrawing::drawFrontNumbers() {
     std::vector<std::array<double, 2>> taken;
-    for (std::size_t i = 0; i < plot_.front.size(); ++i) {
-        const auto& place = plot_.front[i];
-        if (!x_.holds(place[0]) || !y_.holds(place[1])) continue;
-        const double x = x_.at(place[0]) + 5, y = std::min(y_.at(place[1]) + 18, bottom_ - 3);
-        const bool isFree = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
-            return std::abs(other[0] - x) < 17 && std::abs(other[1] - y) < 14;
-        });
-        if (!isFree) continue;
-        taken.push_back({x, y});
-        svg_ += svgText(x, y, std::to_string(i + 1), TextAnchor::middle, "f");
+    for (const XySeries& series : plot_.series) {
+        for (const XyPoint& p : series.points) {
+            if (p.frontNumber == 0 || !shows(p)) continue;
+            const double x = x_.at(p.x) + 7, y = std::min(y_.at(p.y) + 21, bottom_ - 3);
+            const bool isFree = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
+                return std::abs(other[0] - x) < 17 && std::abs(other[1] - y) < 14;
+            });
+            if (!isFree) continue;
+            taken.push_back({x, y});
+            svg_ += svgText(x, y, std::to_string(p.frontNumber), TextAnchor::middle, "f");
+        }
     }
 }
 
@@ -138,7 +139,7 @@ void XyDrawing::drawSeries(const XySeries& series) {
         if (p.low > 0 && std::max(y_.at(p.low) - y, y - y_.at(p.high)) > (series.style.isFaint ? 2 : 4))
             marks += svgLine(x, y_.at(p.low), x, y_.at(p.high), "e");
         marks += svgMark(x, y, series.style, p.tip);
-        if (p.isOnFront)
+        if (p.frontNumber > 0)
             marks += fmt::format("<circle class=\"o\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"8.5\"/>\n", x, y);
     }
     for (const auto& place : series.fit)

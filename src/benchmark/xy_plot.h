@@ -14,7 +14,7 @@ struct XyPoint {
     double x = 0, y = 0;
     double low = 0, high = 0;  ///< of y; drawn where they can be told from it
     std::string tip;
-    bool isOnFront = false;
+    int frontNumber = 0;  ///< of its place on the front, from 1; 0: not on it
 };
 
 struct XySeries {
@@ -31,7 +31,7 @@ struct XyPlot {
     std::string title;
     AxisSpec x, y;
     std::vector<XySeries> series;
-    std::vector<std::array<double, 2>> front;  ///< from fastest to closest; marked, with a number each
+    std::vector<std::array<double, 2>> front;  ///< from fastest to closest: a broad line behind
     std::optional<double> level;               ///< a value of y to compare with
     std::string levelLabel;
 };
