@@ -105,8 +105,9 @@ std::string fastestSentence(const std::vector<EqualError>& all, const std::strin
 
 PageTable equalErrorTable(const PageSource& source, const std::vector<EqualError>& all,
                           const std::string& measure, bool ofVariations) {
-    PageTable table{
-        measureInWords(measure) + " of at most", {{"", PageCell::words}, {"grid", PageCell::words}}, {}};
+    PageTable table{capitalised(measureInWords(measure)) + " of at most",
+                    {{"", PageCell::words}, {"grid", PageCell::words}},
+                    {}};
     const std::vector<double> bounds = boundsOf(all);
     for (const double bound : bounds) table.columns.push_back({boundText(bound), PageCell::time});
     for (const PageVariant& variant : source.variants())
@@ -189,7 +190,7 @@ XyPlot errorTimePanel(const PageSource& source, const std::string& measure, bool
                 {run.variant->name, {}, criterionStyle(run.variant->style, run.criterion), {}, true, {}});
             XySeries& added = plot.series.back();
             if (isAdaptive && run.criterion != "error")
-                added.shortLabel = run.criterion,
+                added.shortLabel = run.isUniform() ? run.variant->name : run.criterion,
                 added.label += ", " + (run.isUniform() ? "uniform" : run.criterion);
         }
         const auto onFront = std::find(front.begin(), front.end(), &run);
@@ -209,9 +210,10 @@ std::string frontSentence(const PageSource& source, const std::string& measure) 
             names.push_back(run->variant->name);
     if (names.empty()) return {};
     const std::string about = fmt::format("By the {}, ", measureInWords(measure));
-    return names.size() == 1
-               ? about + names[0] + " is the fastest at every error."
-               : about + "which is the fastest depends on the error: " + listInWords(names) + " take turns.";
+    if (names.size() == 1) return about + names[0] + " is the fastest at every error.";
+    std::string text = about + "the fastest are, depending on the error: ";
+    for (std::size_t i = 0; i < names.size(); ++i) text += (i > 0 ? "; " : "") + names[i];
+    return text + ".";
 }
 
 std::vector<std::string> frontMembers(const PageSource& source, const std::string& measure) {

@@ -95,7 +95,7 @@ std::vector<DotRow> speedUpRows(const PageSource& source, const Json& grid) {
             if (row.label == name) return row;
         const auto v = std::find_if(source.variants().begin(), source.variants().end(),
                                     [&](const PageVariant& other) { return other.name == name; });
-        rows.push_back({label,
+        rows.push_back({name,
                         v == source.variants().end() ? PlotStyle{kInkColour, 0, 0, false, false} : v->style,
                         {},
                         "",
@@ -111,7 +111,7 @@ std::vector<DotRow> speedUpRows(const PageSource& source, const Json& grid) {
                 rowOf(name).marks.push_back({*software / *ms, 0, 0, kCircle, false,
                                              fmt::format("{}, {}, here: {}, software {}", name, points,
                                                          timeText(*ms), timeText(*software)),
-                                             timesText(*software / *ms)});
+                                             speedText(*software / *ms)});
     if (const auto software = softwareSeconds(grid); software && published.is_object())
         for (const auto& [name, p] : published.items()) {
             const auto seconds = numberOf(partOf(p, "tot_s"));
@@ -121,7 +121,7 @@ std::vector<DotRow> speedUpRows(const PageSource& source, const Json& grid) {
                 .marks.push_back({*software / *seconds, 0, 0, kDiamond, true,
                                   fmt::format("{}, {}, published: {}, software {}", name, points,
                                               timeText(*seconds * 1e3), timeText(*software * 1e3)),
-                                  timesText(*software / *seconds)});
+                                  speedText(*software / *seconds)});
         }
     return rows.size() > 1 ? rows : std::vector<DotRow>();
 }
@@ -191,7 +191,7 @@ PageTable paperTable(const Json& set) {
                      {"over software"}},
                     {}};
     const auto speedUp = [](std::optional<double> software, std::optional<double> time) {
-        return software && time && *time > 0 ? timesText(*software / *time) : std::string();
+        return software && time && *time > 0 ? speedText(*software / *time) : std::string();
     };
     for (const Json& grid : entriesOf(partOf(set, "grids"))) {
         const Json& measured = partOf(grid, "measured");

@@ -35,11 +35,11 @@ svg { display: block; width: 100%; height: auto; overflow: visible; }
 table { border-collapse: collapse; font-size: .87rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; font-weight: 600; padding: .25rem 0; }
 th, td { padding: .25rem .6rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--grid); }
-th { vertical-align: bottom; font-weight: 600; color: var(--soft); }
+th { vertical-align: bottom; font-weight: 600; color: var(--soft); white-space: normal; max-width: 8rem; }
 td.w, th.w { text-align: left; }
 td.none { color: var(--soft); }
-td:first-child, th:first-child { padding-left: 0; }
-tbody tr:hover { background: var(--panel); }
+td:first-child, th:first-child { padding-left: 0; position: sticky; left: 0; background: var(--ground); }
+tbody tr:hover, tbody tr:hover td:first-child { background: var(--panel); }
 details { margin: .75rem 0; }
 summary { cursor: pointer; color: var(--k0); padding: .25rem 0; }
 dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .2rem 1rem; max-width: 60rem; font-size: .92rem; }

@@ -103,6 +103,11 @@ std::string timesText(double ratio) {
     return withUnit(threeDigits(ratio), "times");
 }
 
+std::string speedText(double ratio) {
+    if (ratio >= 1 || ratio <= 0) return threeDigits(ratio) + "\u00d7";
+    return "1/" + threeDigits(1 / ratio);
+}
+
 std::string listInWords(const std::vector<std::string>& words) {
     std::string text;
     for (std::size_t i = 0; i < words.size(); ++i)

@@ -32,6 +32,8 @@ std::string amountText(double count);
 std::string bytesText(double bytes);
 /// "3.21 times".
 std::string timesText(double ratio);
+/// A speed over another: "2.67" and the sign for times, or "1/9.60" of it.
+std::string speedText(double ratio);
 
 /// "a", "a and b", "a, b and c".
 std::string listInWords(const std::vector<std::string>& words);

@@ -100,13 +100,12 @@ std::string growthSentence(const std::vector<Growth>& all, const std::string& wh
 }
 
 std::string growthTable(const std::vector<Growth>& all, const std::string& twice) {
-    PageTable table{"", {{"", PageCell::words}, {"power"}, {"95 % interval"}, {twice}, {"points"}}, {}};
+    PageTable table{"", {{"", PageCell::words}, {"power"}, {"95 % interval"}, {twice}}, {}};
     for (const Growth& g : all) {
         if (!g.exponent) continue;
         const std::string interval = g.low && g.high ? fmt::format("{:.2f} to {:.2f}", *g.low, *g.high) : "";
         table.rows.push_back({g.variant->name, fmt::format("{:.2f}", *g.exponent), interval,
-                              timesText(std::pow(2, *g.exponent)) + " as long",
-                              std::to_string(g.points.size())});
+                              timesText(std::pow(2, *g.exponent)) + " as long"});
     }
     return tableHtml(table);
 }

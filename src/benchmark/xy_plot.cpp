@@ -109,7 +109,8 @@ void XyDrawing::drawFrontNumbers() {
     for (const XySeries& series : plot_.series) {
         for (const XyPoint& p : series.points) {
             if (p.frontNumber == 0 || !shows(p)) continue;
-            const double x = x_.at(p.x) + 7, y = std::min(y_.at(p.y) + 21, bottom_ - 3);
+            const bool hasRoomBelow = y_.at(p.y) + 21 < bottom_ - 2;
+            const double x = x_.at(p.x) + (hasRoomBelow ? 7 : 15), y = y_.at(p.y) + (hasRoomBelow ? 21 : 5);
             const bool isFree = std::none_of(taken.begin(), taken.end(), [&](const auto& other) {
                 return std::abs(other[0] - x) < 17 && std::abs(other[1] - y) < 14;
             });
