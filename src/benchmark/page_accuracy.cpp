@@ -383,13 +383,13 @@ std::string equalErrorSection(const PageSource& source) {
         "asks for it. "
         "Lines through marks are 95 % intervals.");
     for (const char* const measure : kMeasures) {
-        const std::string figure = figureHtml(equalErrorFigure(source, measure));
-        if (figure.empty()) continue;
+        const std::string table = tableHtml(equalErrorTable(source, all, measure, false));
+        if (table.empty()) continue;
         html += "<h3>" +
                 std::string(measure == std::string("max") ? "By the largest error"
                                                           : "By the typical error (RMS)") +
-                "</h3>\n" + paragraphHtml(fastestSentence(all, measure), "says") + figure;
-        html += tableHtml(equalErrorTable(source, all, measure, false));
+                "</h3>\n" + paragraphHtml(fastestSentence(all, measure), "says") +
+                figureHtml(equalErrorFigure(source, measure)) + table;
         html += detailsHtml("The same for the variations",
                             tableHtml(equalErrorTable(source, all, measure, true)));
     }

@@ -32,13 +32,14 @@ svg { display: block; width: 100%; height: auto; overflow: visible; }
 .beside { display: grid; grid-template-columns: minmax(0, 1fr); gap: 0 2.5rem; }
 .narrow { max-width: 30rem; }
 .scroll { overflow-x: auto; margin: .75rem 0; max-width: 100%; }
-table { border-collapse: collapse; font-size: .87rem; font-variant-numeric: tabular-nums; }
+table { border-collapse: separate; border-spacing: 0; font-size: .87rem; font-variant-numeric: tabular-nums; }
 caption { text-align: left; font-weight: 600; padding: .25rem 0; }
 th, td { padding: .25rem .6rem; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--grid); }
 th { vertical-align: bottom; font-weight: 600; color: var(--soft); white-space: normal; max-width: 8rem; }
 td.w, th.w { text-align: left; }
 td.none { color: var(--soft); }
-td:first-child, th:first-child { padding-left: 0; position: sticky; left: 0; background: var(--ground); }
+td:first-child, th:first-child { padding-left: 0; position: sticky; left: 0; background: var(--ground);
+  max-width: 11rem; overflow: hidden; text-overflow: ellipsis; }
 tbody tr:hover, tbody tr:hover td:first-child { background: var(--panel); }
 details { margin: .75rem 0; }
 summary { cursor: pointer; color: var(--k0); padding: .25rem 0; }
@@ -60,10 +61,11 @@ constexpr const char* kPrintStyle = R"(
   main { max-width: none; padding: 0; }
   nav { display: none; }
   details::details-content { content-visibility: visible; display: block; }
-  .wide { display: block; max-width: 15cm; } .narrow { display: none; }
+  .wide { display: block; max-width: 13cm; } .narrow { display: none; }
   .panels.many { grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 1rem; }
   svg, tr, .advice, li { break-inside: avoid; }
-  h2, h3, caption, .soft { break-after: avoid; }
+  h2, h3, caption, .soft, .says, section > p { break-after: avoid; } figure { break-before: avoid; }
+  td:first-child { max-width: none; position: static; }
   .scroll { overflow: visible; }
   table { font-size: 8.5px; } th, td { padding: .15rem .3rem; white-space: normal; }
 }
@@ -73,10 +75,29 @@ const char* classOf(PageCell kind) {
     return kind == PageCell::words ? " class=\"w\"" : kind == PageCell::time ? " class=\"ms\"" : "";
 }
 
+/// Rows without a single number say nothing.
+bool hasNumbers(const std::vector<std::string>& row, const std::vector<TableColumn>& columns) {
+    for (std::size_t i = 0; i < row.size() && i < columns.size(); ++i)
+        if (columns[i].kind != PageCell::words && !row[i].empty()) return true;
+    return false;
+}
+
+std::string rowHtml(const std::vector<std::string>& row, const std::vector<TableColumn>& columns) {
+    std::string html = "<tr>";
+    for (std::size_t i = 0; i < row.size() && i < columns.size(); ++i)
+        html +=
+            fmt::format("<td{}>{}</td>", row[i] == kNotReached ? " class=\"none\"" : classOf(columns[i].kind),
+                        row[i].empty() ? "&ndash;" : inHtml(row[i]));
+    return html + "</tr>\n";
+}
+
 }  // namespace
 
 std::string tableHtml(const PageTable& table) {
-    if (table.rows.empty()) return {};
+    std::string body;
+    for (const auto& row : table.rows)
+        if (hasNumbers(row, table.columns)) body += rowHtml(row, table.columns);
+    if (body.empty()) return {};
     std::string html = "<div class=\"scroll\"><table>\n";
     if (!table.caption.empty()) html += fmt::format("<caption>{}</caption>\n", inHtml(table.caption));
     html += "<thead><tr>";
@@ -84,15 +105,7 @@ std::string tableHtml(const PageTable& table) {
         html += fmt::format("<th{}>{}</th>", column.kind == PageCell::words ? classOf(column.kind) : "",
                             inHtml(column.heading));
     html += "</tr></thead>\n<tbody>\n";
-    for (const auto& row : table.rows) {
-        html += "<tr>";
-        for (std::size_t i = 0; i < row.size() && i < table.columns.size(); ++i)
-            html += fmt::format("<td{}>{}</td>",
-                                row[i] == kNotReached ? " class=\"none\"" : classOf(table.columns[i].kind),
-                                row[i].empty() ? "&ndash;" : inHtml(row[i]));
-        html += "</tr>\n";
-    }
-    return html + "</tbody></table></div>\n";
+    return html + body + "</tbody></table></div>\n";
 }
 
 std::string figureHtml(const PlotFigure& figure) {

@@ -19,7 +19,7 @@ struct TableColumn {
 /// A cell that says that there is no such time.
 inline constexpr std::string_view kNotReached = "not reached";
 
-/// Cells are text, not yet safe for HTML; empty ones become dashes.
+/// Cells are text, not yet safe for HTML; empty ones become dashes, and rows without a number are left out.
 struct PageTable {
     std::string caption;
     std::vector<TableColumn> columns;

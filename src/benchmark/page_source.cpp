@@ -106,6 +106,7 @@ std::string PageSource::missingPeers(const std::vector<std::string>& present) co
 }
 
 std::string criterionInWords(const std::string& criterion) {
+    if (criterion.empty()) return "any grid";
     if (criterion == "error") return "by error";
     if (criterion == "element size") return "by element size";
     return criterion == "focus" ? "around a focus" : criterion;

@@ -1,0 +1,1 @@
+tessera_test(benchmark_page_test FOLDER benchmark LINK benchmark)
