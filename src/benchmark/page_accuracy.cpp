@@ -421,11 +421,11 @@ std::string errorTimeSection(const PageSource& source) {
     std::string html = paragraphHtml(
         "Each mark is one run. To the right the result is closer to the mesh's own field, further down it is "
         "there "
-        "sooner: the best are at the lower right. The broad band joins the runs that no other beats in both; "
-        "they are "
-        "ringed, numbered and listed below. Thin grey lines are variations. Other programs make uniform "
-        "grids only, "
-        "and are repeated beside the adaptive ones.");
+        "sooner: the best are at the lower right. The broad band joins the runs that no other beats in both, "
+        "of all "
+        "grids; they are ringed, numbered and listed below. Thin grey lines are variations. Other programs "
+        "make uniform "
+        "grids only, and are repeated beside the adaptive ones.");
     for (const char* const measure : kMeasures) html += paragraphHtml(frontSentence(source, measure), "says");
     html += figure;
     for (const char* const measure : kMeasures)

@@ -63,7 +63,7 @@ constexpr const char* kPrintStyle = R"(
   details::details-content { content-visibility: visible; display: block; }
   .wide { display: block; max-width: 13cm; } .narrow { display: none; }
   .panels.many { grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 1rem; }
-  svg, tr, .advice, li { break-inside: avoid; }
+  svg, tr, .advice, li, p { break-inside: avoid; }
   h2, h3, caption, .soft, .says, section > p { break-after: avoid; } figure { break-before: avoid; }
   td:first-child { max-width: none; position: static; }
   .scroll { overflow: visible; }

@@ -29,6 +29,7 @@ class XyDrawing {
 
   private:
     bool shows(const XyPoint& p) const { return x_.holds(p.x) && y_.holds(p.y); }
+    std::vector<AxisTick> yTicks() const { return y_.ticks(canvas_.isNarrow ? 26 : 30); }
     double gapOfLabels() const { return canvas_.textSize + 2.5; }
     void drawAxes();
     void drawFront();
@@ -42,8 +43,10 @@ class XyDrawing {
 
     const XyPlot& plot_;
     const PlotCanvas& canvas_;
-    double left_, right_, top_, bottom_;
-    PlotAxis x_, y_;
+    double top_, bottom_;
+    PlotAxis y_;
+    double left_, right_;
+    PlotAxis x_;
     std::string svg_;
 };
 
@@ -62,6 +65,12 @@ double gutterOf(const XyPlot& plot, const PlotCanvas& canvas) {
     return std::min(widest, canvas.isNarrow ? kLongestNarrowLabel : kLongestLabel) + 22;
 }
 
+double widestOf(const std::vector<AxisTick>& ticks, double textSize) {
+    double widest = 24;
+    for (const AxisTick& tick : ticks) widest = std::max(widest, widthOf(tick.label, textSize));
+    return widest;
+}
+
 double heightOf(const XyPlot& plot, const PlotCanvas& canvas) {
     const auto labels = std::count_if(plot.series.begin(), plot.series.end(),
                                       [](const XySeries& s) { return !s.style.isFaint; });
@@ -71,18 +80,18 @@ double heightOf(const XyPlot& plot, const PlotCanvas& canvas) {
 XyDrawing::XyDrawing(const XyPlot& plot, const PlotCanvas& canvas)
     : plot_(plot),
       canvas_(canvas),
-      left_(canvas.isNarrow ? 54 : 62),
-      right_(canvas.width - gutterOf(plot, canvas)),
       top_(plot.title.empty() ? 26 : 46),
       bottom_(top_ + heightOf(plot, canvas)),
-      x_(withValues(plot.x, plot, true), left_ + 6, right_ - 6),
-      y_(withValues(plot.y, plot, false), bottom_ - 4, top_ + 4) {}
+      y_(withValues(plot.y, plot, false), bottom_ - 4, top_ + 4),
+      left_(widestOf(yTicks(), canvas.textSize) + 12),
+      right_(canvas.width - gutterOf(plot, canvas)),
+      x_(withValues(plot.x, plot, true), left_ + 6, right_ - 6) {}
 
 void XyDrawing::drawAxes() {
     const double size = canvas_.textSize;
     if (!plot_.title.empty()) svg_ += svgText(0, size + 1, plot_.title, TextAnchor::start, "t");
     svg_ += svgText(0, top_ - 9, plot_.y.title, TextAnchor::start, "a");
-    for (const AxisTick& tick : y_.ticks(canvas_.isNarrow ? 26 : 30)) {
+    for (const AxisTick& tick : yTicks()) {
         svg_ += svgLine(left_, y_.at(tick.value), right_, y_.at(tick.value), "g");
         svg_ += svgText(left_ - 6, y_.at(tick.value) + size * 0.36, tick.label, TextAnchor::end, "a");
     }
