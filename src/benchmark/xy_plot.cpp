@@ -13,7 +13,7 @@ namespace tessera {
 namespace {
 
 constexpr double kMarkReach = 6;  // from the middle of a mark to its edge
-constexpr double kLongestLabel = 180, kLongestNarrowLabel = 112;
+constexpr double kLongestLabel = 196, kLongestNarrowLabel = 112;
 
 /// The name of a curve beside its end.
 struct EndLabel {
