@@ -23,9 +23,9 @@
 #include <string>
 #include <vector>
 
-#include "accuracy_plot.h"
 #include "arguments.h"
 #include "benchmark/picture_errors.h"
+#include "benchmark/xy_plot.h"
 #include "job/scene_picture.h"
 #include "mesh_files/read_mesh.h"
 #include "refine/plan.h"
@@ -138,10 +138,35 @@ std::ofstream opened(const std::string& path) {
     return file;
 }
 
+XySeries seriesOf(Criterion criterion) {
+    const bool isByError = criterion == Criterion::error;
+    return {isByError ? "by error" : "uniform",
+            {},
+            {isByError ? 0 : 1, isByError ? 3 : 0, 0, false, false},
+            {},
+            true,
+            {}};
+}
+
+/// A panel a mesh, over the same axes.
+std::string plotsSvg(std::vector<XyPlot> plots) {
+    AxisRange voxels, rms;
+    for (const XyPlot& plot : plots)
+        for (const XySeries& series : plot.series)
+            for (const XyPoint& point : series.points) voxels.include(point.x), rms.include(point.y);
+    PlotFigure figure{"RMS against the exact picture, by voxels", {}, {}};
+    for (XyPlot& plot : plots) {
+        plot.x = {"voxels", AxisUnit::amount, false, false, voxels, {}};
+        plot.y = {"RMS in steps of 1/255; below is closer", AxisUnit::plain, false, false, rms, {}};
+        figure.panels.emplace_back([plot](const PlotCanvas& canvas) { return drawXyPlot(plot, canvas); });
+    }
+    return standaloneSvg(figure);
+}
+
 void run(const Options& options) {
     std::ofstream csv;
     if (!options.csvPath.empty()) csv = opened(options.csvPath), csv << kCsvHeading;
-    std::vector<bench::AccuracyPanel> panels;
+    std::vector<XyPlot> plots;
     fmt::print("{}", kTableHeading);
     std::string notes;
     for (const std::string& word : options.meshes) {
@@ -162,31 +187,26 @@ void run(const Options& options) {
         notes +=
             fmt::format("{}: the exact picture took {:.2g} s; {} pixels see the mesh, {} of them inside\n",
                         name, 1e-3 * reference.exactMs(), reference.pixelsOfMesh(), reference.pixelsInside());
-        bench::AccuracyPanel& panel = panels.emplace_back();
-        panel.title = name;
+        XyPlot& plot = plots.emplace_back();
+        plot.title = name;
         for (const Criterion criterion : {Criterion::error, Criterion::uniform}) {
-            bench::AccuracyLine drawn, values;
+            XySeries drawn = seriesOf(criterion), values = drawn;
+            values.label += ", values alone", values.style.dash = 1, values.style.isHollow = true;
             for (const std::int64_t budget : options.budgets) {
                 const Row row = measure(options, reference, criterion, budget, execution);
                 fmt::print("{}", tableText(inTable(name), row));
                 std::fflush(stdout);
                 if (csv.is_open())
                     csv << file << ',' << reference.title() << ',' << csvText(row) << std::flush;
-                drawn.points.push_back({double(row.voxels), row.errors.drawn.all});
-                values.points.push_back({double(row.voxels), row.errors.values.all});
+                drawn.points.push_back({.x = double(row.voxels), .y = row.errors.drawn.all, .tip = {}});
+                values.points.push_back({.x = double(row.voxels), .y = row.errors.values.all, .tip = {}});
             }
-            const bool isByError = criterion == Criterion::error;
-            drawn.label = isByError ? "by error" : "uniform";
-            values.label = drawn.label + ", values alone";
-            drawn.colour = values.colour = isByError ? "#0b6fa4" : "#c1541b";
-            values.isDashed = true;
-            panel.lines.push_back(drawn);
-            panel.lines.push_back(values);
+            plot.series.push_back(drawn);
+            plot.series.push_back(values);
         }
     }
     fmt::print("\n{}", notes);
-    if (!options.plotPath.empty())
-        opened(options.plotPath) << bench::accuracyPlot(panels, "voxels", "RMS of 255");
+    if (!options.plotPath.empty()) opened(options.plotPath) << plotsSvg(std::move(plots));
 }
 
 }  // namespace

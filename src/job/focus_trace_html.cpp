@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "job/focus_trace_text.h"
+#include "job/html_text.h"
 #include "job/report_text.h"
 
 namespace tessera {
@@ -34,30 +35,6 @@ constexpr const char* kMemoryColour = "#2a7d4f";
 
 constexpr double kPlotWidth = 900, kPlotLeft = 80, kPlotRight = 880;
 constexpr int kMostTicks = 10;
-
-/// Text between tags or in quotes.
-std::string inHtml(const std::string& text) {
-    std::string safe;
-    for (const char c : withoutControls(text)) {
-        switch (c) {
-            case '&':
-                safe += "&amp;";
-                break;
-            case '<':
-                safe += "&lt;";
-                break;
-            case '>':
-                safe += "&gt;";
-                break;
-            case '"':
-                safe += "&quot;";
-                break;
-            default:
-                safe += c;
-        }
-    }
-    return safe;
-}
 
 /// 1, 2 or 5 times a power of ten, at least `least`.
 double roundStep(double least) {
