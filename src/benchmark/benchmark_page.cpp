@@ -68,6 +68,7 @@ std::string benchmarkPage(const Json& document) {
         {"<a href=\"#exactness\">Exactness</a>\n", exactnessSection(source)},
         {"<a href=\"#warm\">Warm runs</a>\n", warmSection(source)},
         {"<a href=\"#paper\">The paper</a>\n", paperSection(source)},
+        {"<a href=\"#compared\">Since the earlier run</a>\n", comparisonSection(source)},
         {"<a href=\"#method\">How it was measured</a>\n", methodSection(source)},
     };
     std::string links, body;
@@ -80,38 +81,26 @@ std::string benchmarkPage(const Json& document) {
     return pageHtml(titleOf(document), headHtml(document) + links + body);
 }
 
-std::string benchmarkPlotSvg(const Json& document, PlotKind kind) {
+std::vector<PlotFile> benchmarkPlots(const Json& document) {
     const PageSource source(document);
-    const auto figure = [&]() -> PlotFigure {
-        switch (kind) {
-            case PlotKind::timeAtEqualError:
-                return equalErrorFigure(source, "max");
-            case PlotKind::timeAtEqualRms:
-                return equalErrorFigure(source, "rms");
-            case PlotKind::errorAgainstTime:
-                return errorTimeFigure(source);
-            case PlotKind::timeAgainstResolution:
-                return scalingFigure(source, "resolution");
-            case PlotKind::timeAgainstElements:
-                return scalingFigure(source, "elements");
-            case PlotKind::stages:
-                return stagesFigure(source);
-            case PlotKind::voxelsAgainstError:
-                return voxelFigure(source);
-            case PlotKind::roofline:
-                return rooflineFigure(source);
-            case PlotKind::ownErrors:
-                return oracleFigure(source);
-            case PlotKind::pictureErrors:
-                return pictureFigure(source);
-            case PlotKind::paperSpeedUps:
-                return paperFigure(source);
-            case PlotKind::noise:
-                return noiseFigure(source);
-        }
-        return {};
-    }();
-    return figure.panels.empty() ? std::string() : standaloneSvg(figure);
+    const std::pair<const char*, PlotFigure> figures[] = {
+        {"time-at-equal-error", equalErrorFigure(source, "max")},
+        {"time-at-equal-rms", equalErrorFigure(source, "rms")},
+        {"error-against-time", errorTimeFigure(source)},
+        {"time-against-resolution", scalingFigure(source, "resolution")},
+        {"time-against-elements", scalingFigure(source, "elements")},
+        {"stages", stagesFigure(source)},
+        {"voxels-against-error", voxelFigure(source)},
+        {"roofline", rooflineFigure(source)},
+        {"exactness", oracleFigure(source)},
+        {"pictures", pictureFigure(source)},
+        {"paper", paperFigure(source)},
+        {"noise", noiseFigure(source)},
+    };
+    std::vector<PlotFile> plots;
+    for (const auto& [name, figure] : figures)
+        if (!figure.panels.empty()) plots.push_back({name, standaloneSvg(figure)});
+    return plots;
 }
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "job/run_report.h"
 
@@ -10,23 +11,12 @@ namespace tessera {
 /// on phones and wide screens, light and dark, and printed. What the document lacks is left out.
 std::string benchmarkPage(const Json& document);
 
-/// The plots that can stand alone.
-enum class PlotKind {
-    timeAtEqualError,
-    timeAtEqualRms,
-    errorAgainstTime,
-    timeAgainstResolution,
-    timeAgainstElements,
-    stages,
-    voxelsAgainstError,
-    roofline,
-    ownErrors,
-    pictureErrors,
-    paperSpeedUps,
-    noise,
+/// A plot of the page as an SVG file, in fixed colours on white.
+struct PlotFile {
+    std::string name;  ///< "error-against-time"
+    std::string svg;
 };
-
-/// One plot of the page as an SVG file, in fixed colours on white. Empty if the document has nothing for it.
-std::string benchmarkPlotSvg(const Json& document, PlotKind kind);
+/// Those that the document has something for.
+std::vector<PlotFile> benchmarkPlots(const Json& document);
 
 }  // namespace tessera

@@ -469,6 +469,24 @@ PlotFigure noiseFigure(const PageSource& source) {
     return figure;
 }
 
+std::string comparisonSection(const PageSource& source) {
+    const Json& compared = partOf(source.json(), "compared");
+    std::vector<std::string> sentences;
+    for (const Json& sentence : entriesOf(partOf(compared, "sentences")))
+        if (const std::string words = wordsOf(sentence); !words.empty()) sentences.push_back(words);
+    if (sentences.empty()) return {};
+    PageTable table{"Time over that of the earlier run",
+                    {{"", PageCell::words}, {"cases"}, {"median"}, {"95 % interval"}, {"", PageCell::words}},
+                    {}};
+    for (const Json& row : entriesOf(partOf(compared, "algorithms")))
+        if (const auto ratio = pageTimeOf(partOf(row, "ratio")))
+            table.rows.push_back({wordsOf(partOf(row, "algorithm")), wholeText(ratio->count),
+                                  fmt::format("{:.3g}", ratio->median),
+                                  fmt::format("{:.3g} to {:.3g}", ratio->low, ratio->high),
+                                  wordsOf(partOf(row, "verdict"))});
+    return sectionHtml("compared", "Since the earlier run", listHtml(sentences, "says") + tableHtml(table));
+}
+
 std::string methodSection(const PageSource& source) {
     const Json& document = source.json();
     const std::string facts = factsHtml(source), noise = figureHtml(noiseFigure(source)),

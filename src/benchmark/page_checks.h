@@ -16,6 +16,9 @@ PlotFigure oracleFigure(const PageSource& source);
 std::string paperSection(const PageSource& source);
 PlotFigure paperFigure(const PageSource& source);
 
+/// What got faster or slower since an earlier run.
+std::string comparisonSection(const PageSource& source);
+
 std::string methodSection(const PageSource& source);
 /// A variant timed as two.
 PlotFigure noiseFigure(const PageSource& source);

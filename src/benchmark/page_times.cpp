@@ -318,8 +318,9 @@ std::string scalingSection(const PageSource& source, const std::string& axis) {
     if (figure.empty()) return {};
     const bool isResolution = axis == "resolution";
     const std::vector<Growth> growths = growthsOf(source, axis);
-    std::string how = isResolution ? "Uniform grids, from coarse to fine."
-                                   : "The same grid on larger and larger parts of a mesh";
+    std::string how =
+        isResolution ? "Uniform grids, from coarse to fine."
+                     : "The same grid in boxes of more and more elements, whose sizes differ tenfold an axis";
     if (!isResolution) {
         const auto resolution = numberOf(partOf(source.json(), "scaling", "elements_resolution"));
         how += resolution ? fmt::format(", {} points along its longest side.", wholeText(*resolution)) : ".";

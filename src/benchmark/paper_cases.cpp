@@ -40,10 +40,11 @@ bool isTimed(const BenchmarkVariant& variant) {
 }  // namespace
 
 PaperCases::PaperCases(const TetMesh& mesh, const std::string& meshName,
-                       std::span<const BenchmarkVariant> variants, int mostPoints) {
+                       std::span<const BenchmarkVariant> variants, int mostPoints, std::size_t mostSets) {
     for (const BenchmarkVariant& variant : variants)
         if (isTimed(variant)) variants_.push_back(&variant);
-    for (const PaperDataSet& published : paperDataSets()) {
+    const std::span<const PaperDataSet> all = paperDataSets();
+    for (const PaperDataSet& published : all.first(std::min(mostSets, all.size()))) {
         DataSet set;
         set.published = &published;
         set.name = std::string(published.prefix) + meshName;

@@ -43,7 +43,7 @@ struct Extent {
     std::vector<std::array<int, 2>> bricks;  ///< edges, and elements that they hold
     int variationPoints = 0, mostRounds = 0, paperPoints = 0, elementsPoints = 0, pictureSize = 0, places = 0,
         lattices = 0;
-    double seconds = 0, longestRunMs = 0;
+    double seconds = 0, longestRunMs = 0, sampleMs = 0;
 };
 
 Extent extentOf(const BenchmarkRequest& request) {
@@ -52,19 +52,20 @@ Extent extentOf(const BenchmarkRequest& request) {
         extent = {.resolutions = {24, 48, 96},
                   .focusPoints = {96},
                   .warmPoints = {},
-                  .elements = {2000, 10000, 50000},
+                  .elements = {2000, 8000, 32000},
                   .bounds = {0.1, 0.05},
                   .elementSamples = {1},
                   .bricks = {{16, 100}},
                   .variationPoints = 48,
                   .mostRounds = 6,
                   .paperPoints = 128,
-                  .elementsPoints = 48,
+                  .elementsPoints = 24,
                   .pictureSize = 160,
                   .places = 1000,
                   .lattices = 2,
                   .seconds = 24,
-                  .longestRunMs = 400};
+                  .longestRunMs = 250,
+                  .sampleMs = 20};
     else
         extent = {.resolutions = {32, 64, 128, 256},
                   .focusPoints = {128, 256, 512},
@@ -81,7 +82,8 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .places = 1000,
                   .lattices = 4,
                   .seconds = 420,
-                  .longestRunMs = 8e3};
+                  .longestRunMs = 8e3,
+                  .sampleMs = 60};
     if (!request.resolutions.empty()) {
         extent.resolutions = request.resolutions;
         std::sort(extent.resolutions.begin(), extent.resolutions.end());
@@ -224,8 +226,10 @@ void Benchmark::addBrickCases() {
         }
         for (const int points : extent_.resolutions) add(uniformCase(v, mesh_, points), "uniform");
         if (v.role == VariantRole::again) continue;
+        const bool isFirst = &v == &list_.variants.front();
+        if (request_.isQuick && v.role == VariantRole::published) continue;
         for (const double bound : extent_.bounds) add(errorCase(v, mesh_, bound), "error");
-        if (!isMain(v)) continue;
+        if (!isMain(v) || (request_.isQuick && !isFirst)) continue;
         for (const double samples : extent_.elementSamples)
             add(elementSizeCase(v, mesh_, samples), "element size");
         for (const int points : extent_.focusPoints) add(focusCase(v, mesh_, points), "focus");
@@ -270,13 +274,13 @@ void Benchmark::addWarmCases() {
     const ElementIndex index(mesh_, job_.execution.withoutProgress());
     for (const BenchmarkVariant& v : list_.variants) {
         const bool isOther = v.bind.primitives == Primitives::processor && v.role == VariantRole::variation;
-        if (!isMain(v) && !isOther) continue;
+        if (!isMain(v) && (!isOther || request_.isQuick)) continue;
         for (GlThread* to : {static_cast<GlThread*>(nullptr), device}) {
             for (const auto& [edge, elements] : extent_.bricks)
                 if (auto brick = warmBrick(v, mesh_, index, edge, elements, to)) add(std::move(*brick));
             add(warmFocus(v, mesh_, to));
             for (const int points : extent_.warmPoints) add(warmCube(v, mesh_, points, to));
-            if (!device) break;
+            if (!device || (request_.isQuick && !v.resampler->info().isOnDevice)) break;
         }
     }
 }
@@ -284,7 +288,7 @@ void Benchmark::addWarmCases() {
 void Benchmark::addPaperCases() {
     try {
         paper_.emplace(mesh_, std::filesystem::path(meshName_).stem().string(), list_.variants,
-                       extent_.paperPoints);
+                       extent_.paperPoints, request_.isQuick ? 1 : 3);
     } catch (const InputError& error) {
         absent_.push_back(fmt::format("The grids of 2001 are left out: {}", error.what()));
         return;
@@ -454,7 +458,7 @@ Json Benchmark::run() {
     Timer part;
     std::vector<MachineRates> rates;
     for (const int count : std::set<int>{1, threads})
-        rates.push_back(measureMachine(count, request_.isQuick ? 1 : 7));
+        rates.push_back(measureMachine(count, request_.isQuick ? 3 : 7));
     parts["machine"] = part.restart() / 1000;
     addBrickCases();
     addElementCases();
@@ -464,6 +468,7 @@ Json Benchmark::run() {
     const int rounds = runRounds(cases_,
                                  {.rounds = extent_.mostRounds,
                                   .seed = request_.seed,
+                                  .sampleMs = extent_.sampleMs,
                                   .longestRunMs = extent_.longestRunMs,
                                   .longestMs = 1e3 * extent_.seconds},
                                  job_.execution, [this](const std::string& text) { say(text); });
@@ -507,9 +512,12 @@ Json Benchmark::run() {
                             {"resolutions", extent_.resolutions},  {"seed", request_.seed}};
 
     say(benchmarkText(document, job_.textWidth));
+    std::filesystem::create_directories(folder / "plots");
     writeFile(folder / "oracle.csv", oracleCsv_);
     writeFile(folder / "runs.csv", csvOf(document["runs"]));
     writeFile(folder / "report.json", documentText(document));
+    for (const PlotFile& plot : benchmarkPlots(document))
+        writeFile(folder / "plots" / (plot.name + ".svg"), plot.svg);
     writeFile(folder / "index.html", benchmarkPage(document));
     say(fmt::format("wrote {}\n", (folder / "index.html").string()));
     return document;

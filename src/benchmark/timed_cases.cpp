@@ -69,12 +69,10 @@ class TimeLimit {
     std::thread watch_;
 };
 
-/// A sample of a short run is the median one of several, as many as fit into this.
-constexpr double kSampleMs = 40;
 constexpr int kMostRepeats = 15;
 
-CaseSample sampleOf(const TimedCase& one, const Execution& execution) {
-    const double fit = one.firstMs > 0 ? kSampleMs / one.firstMs : kMostRepeats;
+CaseSample sampleOf(const TimedCase& one, double sampleMs, const Execution& execution) {
+    const double fit = one.firstMs > 0 ? sampleMs / one.firstMs : kMostRepeats;
     const int repeats = std::clamp(int(fit), 1, kMostRepeats) | 1;
     std::vector<CaseSample> samples;
     for (int r = 0; r < repeats; ++r) samples.push_back(one.run(execution));
@@ -144,7 +142,7 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         runFirst(one, rungs[one.ladder], options, execution);
         if (!one.leftOut.empty()) continue;
         timedOnes.push_back(&one);
-        roundMs += std::max(one.firstMs, std::min(kSampleMs, kMostRepeats * one.firstMs));
+        roundMs += std::max(one.firstMs, std::min(options.sampleMs, kMostRepeats * one.firstMs));
     }
     // First runs are slower than later ones, so there is time for what is left.
     const int rounds = std::min(options.rounds, std::max(kFewestRounds, int(options.longestMs / roundMs)));
@@ -156,7 +154,7 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         if (place == 0) std::shuffle(timedOnes.begin(), timedOnes.end(), random);
         execution.report(Stage::sampling, run, runs);
         TimedCase& one = *timedOnes[place];
-        one.samples.push_back(sampleOf(one, execution.withoutProgress()));
+        one.samples.push_back(sampleOf(one, options.sampleMs, execution.withoutProgress()));
     }
     return rounds;
 }

@@ -42,6 +42,8 @@ struct TimedCase {
 struct RoundOptions {
     int rounds = 9;
     std::uint64_t seed = 1;
+    /// A sample of a short run is the median one of several, as many as fit into this, 15 at most.
+    double sampleMs = 40;
     double longestRunMs =
         20e3;                  ///< a case that takes longer is left out, as are those after it on its ladder
     double longestMs = 600e3;  ///< of all rounds: there are fewer, six at least, where they take longer

@@ -1988,7 +1988,7 @@ class Bench(AppTest):
 
     def test_every_part_of_the_report_is_there(self):
         text, report = self.bench("--algorithms", "software,hybrid:processor")
-        self.assertEqual(sorted(p.name for p in (self.folder / "report").iterdir()), ["index.html", "oracle.csv", "report.json", "runs.csv"])
+        self.assertEqual(sorted(p.name for p in (self.folder / "report").iterdir()), ["index.html", "oracle.csv", "plots", "report.json", "runs.csv"])
         self.assertEqual({v["role"] for v in report["variants"]}, {"main", "again", "peer"})
         runs = report["runs"]
         self.assertEqual({r["criterion"] for r in runs}, {"uniform", "element size", "error", "focus"})
