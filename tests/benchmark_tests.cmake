@@ -1,5 +1,6 @@
 if(TARGET tessera_benchmark)
   tessera_test(benchmark_page_test FOLDER benchmark LINK benchmark)
+  tessera_test(benchmark_test FOLDER benchmark LINK benchmark)
   tessera_test(peer_resampler_test FOLDER benchmark LINK benchmark)
   target_compile_definitions(peer_resampler_test PRIVATE TESSERA_PYTHON="${TESSERA_PYTHON}")
   if(TARGET tessera_vtk_peer)

@@ -649,6 +649,10 @@ void addBenchOptions(CLI::App& command, BenchArguments& a) {
                     "for all rounds together: there are fewer, but 6, where they would take longer "
                     "(default: 420, quick 24)")
         ->check(CLI::Range(1.0, 1e6));
+    command
+        .add_option("--longest-run", a.request.longestSeconds,
+                    "seconds: cases that take longer are left out (default: 2.5, quick 0.3)")
+        ->check(CLI::Range(1e-3, 1e6));
     command.add_option("--seed", a.request.seed, "of the orders and of the places that are checked")
         ->capture_default_str();
     command.add_option("--compare", a.request.comparedWith,

@@ -18,8 +18,13 @@ namespace tessera {
 
 namespace {
 
-/// By which all cases of an algorithm together may differ between two runs of one build.
-constexpr double kNoise = 0.06;
+/// By which all cases of an algorithm together may differ from the other algorithms' between two runs of one
+/// build: three standard deviations on a virtual machine of two cores.
+constexpr double kNoise = 0.12;
+/// The same without others to compare with, and of all algorithms together.
+constexpr double kNoiseAlone = 0.25;
+/// So many algorithms tell together how much slower the machine was.
+constexpr std::size_t kFewestOthers = 4;
 
 /// A case that two documents may both have.
 struct ComparedCase {
@@ -56,16 +61,6 @@ std::map<std::string, ComparedCase> casesOf(const Json& document) {
     return cases;
 }
 
-struct CaseRatio {
-    std::string what;
-    double ratio = 1;
-    bool isApart = false;  ///< its two intervals have nothing in common
-};
-
-std::string times(double ratio) {
-    return fmt::format("{:.3g}", ratio);
-}
-
 }  // namespace
 
 Json readBenchmark(const std::string& path) {
@@ -94,51 +89,60 @@ void checkComparable(const Json& earlier, const Json& later) {
 Json compareBenchmarks(const Json& earlier, const Json& later) {
     checkComparable(earlier, later);
     const std::map<std::string, ComparedCase> before = casesOf(earlier), now = casesOf(later);
-    const double yardstick =
-        intervalFrom(later.at("yardstick")).median / intervalFrom(earlier.at("yardstick")).median;
-    std::map<std::string, std::vector<CaseRatio>> byAlgorithm;
+    std::map<std::string, std::vector<double>> byAlgorithm;
     Json cases = Json::array();
     for (const auto& [name, one] : now) {
         const auto found = before.find(name);
         if (found == before.end()) continue;
-        const double ratio = one.ms.median / found->second.ms.median / yardstick;
-        const bool isApart = !one.ms.overlaps(found->second.ms);
-        byAlgorithm[one.algorithm].push_back({name, ratio, isApart});
-        cases.push_back({{"case", name}, {"algorithm", one.algorithm}, {"ratio", ratio}, {"apart", isApart}});
+        const double ratio = one.ms.median / found->second.ms.median;
+        byAlgorithm[one.algorithm].push_back(ratio);
+        cases.push_back({{"case", name},
+                         {"algorithm", one.algorithm},
+                         {"ratio", ratio},
+                         {"apart", !one.ms.overlaps(found->second.ms)}});
     }
+    std::vector<double> medians;
+    for (const auto& [algorithm, ratios] : byAlgorithm) medians.push_back(medianInterval(ratios).median);
+    const bool hasOthers = medians.size() >= kFewestOthers;
+    const double common = medians.empty() ? 1 : medianInterval(medians).median;
+    const double yardstick =
+        intervalFrom(later.at("yardstick")).median / intervalFrom(earlier.at("yardstick")).median;
+
     Json algorithms = Json::array();
     std::vector<std::string> sentences;
-    for (const auto& [algorithm, ratios] : byAlgorithm) {
-        std::vector<double> values;
-        for (const CaseRatio& one : ratios) values.push_back(one.ratio);
-        const MedianInterval interval = medianInterval(std::move(values));
-        const bool isSlower = interval.median > 1 + kNoise && interval.low > 1;
-        const bool isFaster = interval.median < 1 / (1 + kNoise) && interval.high < 1;
-        const char* verdict = interval.count < 2 ? "too few cases"
-                              : isSlower         ? "slower"
-                              : isFaster         ? "faster"
-                                                 : "equal";
+    for (auto& [algorithm, ratios] : byAlgorithm) {
+        if (hasOthers)
+            for (double& ratio : ratios) ratio /= common;
+        const MedianInterval interval = medianInterval(ratios);
+        const double limit = 1 + (hasOthers ? kNoise : kNoiseAlone);
+        const bool isSlower = interval.median > limit && interval.low > 1;
+        const bool isFaster = interval.median < 1 / limit && interval.high < 1;
+        const char* verdict = isSlower ? "slower" : isFaster ? "faster" : "equal";
         algorithms.push_back(
             {{"algorithm", algorithm}, {"ratio", intervalJson(interval)}, {"verdict", verdict}});
-        if (interval.count < 2 || (!isSlower && !isFaster)) continue;
-        sentences.push_back(fmt::format(
-            "{} got {}: {} times the earlier time, the median of {} cases ({} to {}).", algorithm, verdict,
-            times(interval.median), interval.count, times(interval.low), times(interval.high)));
+        if (isSlower || isFaster)
+            sentences.push_back(fmt::format(
+                "{} got {}: {:.3g} times the earlier time{}, the median of {} cases ({:.3g} to {:.3g}).",
+                algorithm, verdict, interval.median, hasOthers ? " when all algorithms' is 1" : "",
+                interval.count, interval.low, interval.high));
     }
     if (sentences.empty())
         sentences.push_back(
-            fmt::format("Nothing got faster or slower beyond noise: {} cases compared.", cases.size()));
-    if (std::abs(std::log(yardstick)) > std::log(1 + kNoise))
-        sentences.push_back(
-            fmt::format("A fixed piece of work took {} times its earlier time: the machine was "
-                        "busier or idler. Ratios are over that.",
-                        times(yardstick)));
+            fmt::format("No algorithm got faster or slower beyond noise: {} cases compared.", cases.size()));
+    if (hasOthers && std::abs(std::log(common)) > std::log(1 + kNoiseAlone))
+        sentences.push_back(fmt::format(
+            "All together took {:.3g} times the earlier time, a fixed piece of work {:.3g} times: {}.",
+            common, yardstick,
+            std::abs(std::log(common / yardstick)) > std::log(1 + kNoiseAlone)
+                ? "the build as a whole got slower or faster, or the machine differs"
+                : "the machine was busier or idler"));
     for (const char* key : {"processor", "opengl"})
         if (earlier.at("machine").at(key) != later.at("machine").at(key))
             sentences.push_back(fmt::format("The earlier report is from another machine or driver: {}.",
                                             earlier["machine"][key].dump()));
     return {{"commit", earlier.at("machine").at("commit")},
             {"date", earlier.at("machine").at("date")},
+            {"common", common},
             {"yardstick", yardstick},
             {"algorithms", std::move(algorithms)},
             {"cases", std::move(cases)},

@@ -17,9 +17,11 @@ void checkComparable(const Json& earlier, const Json& later);
 ///
 /// Times of one case differ between two runs of one program by more than their intervals within a run say: a
 /// machine has good and bad minutes. So the ratios of all cases of an algorithm are taken together, over the
-/// ratio of a fixed piece of work that is timed in every round (the yardstick). An algorithm is named when
-/// their median is off by more than 6 % and the interval of that median, by order statistics, doesn't hold 1.
-/// Gives {"yardstick": .., "algorithms": [..], "cases": [..], "sentences": [..]}.
+/// median of all algorithms, peers among them. An algorithm is named when the median of its ratios is off by
+/// more than 12 % and the interval of that median, by order statistics, doesn't hold 1; with fewer than four
+/// algorithms, when it is off by 25 % from the earlier time itself. When all together are off by 25 %, a
+/// fixed piece of work that is timed in every round tells whether that may be the machine. Gives {"common":
+/// .., "yardstick": .., "algorithms": [..], "cases": [..], "sentences": [..]}.
 Json compareBenchmarks(const Json& earlier, const Json& later);
 
 }  // namespace tessera

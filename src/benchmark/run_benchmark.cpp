@@ -64,15 +64,15 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .places = 1000,
                   .lattices = 2,
                   .seconds = 24,
-                  .longestRunMs = 250,
+                  .longestRunMs = 300,
                   .sampleMs = 20};
     else
         extent = {.resolutions = {32, 64, 128, 256},
-                  .focusPoints = {128, 256, 512},
+                  .focusPoints = {128, 256},
                   .warmPoints = {},
-                  .elements = {10000, 30000, 100000, 300000, 1000000},
+                  .elements = {10000, 30000, 100000, 300000},
                   .bounds = {0.1, 0.05, 0.02, 0.01},
-                  .elementSamples = {1, 2, 4},
+                  .elementSamples = {1, 2},
                   .bricks = {{16, 30}, {16, 300}, {64, 10000}},
                   .variationPoints = 128,
                   .mostRounds = 9,
@@ -81,8 +81,8 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .pictureSize = 512,
                   .places = 1000,
                   .lattices = 4,
-                  .seconds = 420,
-                  .longestRunMs = 8e3,
+                  .seconds = 300,
+                  .longestRunMs = 2.5e3,
                   .sampleMs = 60};
     if (!request.resolutions.empty()) {
         extent.resolutions = request.resolutions;
@@ -94,6 +94,7 @@ Extent extentOf(const BenchmarkRequest& request) {
     if (request.isQuick) extent.warmPoints.resize(1);
     if (request.rounds) extent.mostRounds = *request.rounds;
     if (request.seconds) extent.seconds = *request.seconds;
+    if (request.longestSeconds) extent.longestRunMs = 1e3 * *request.longestSeconds;
     return extent;
 }
 

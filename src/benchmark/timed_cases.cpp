@@ -71,6 +71,11 @@ class TimeLimit {
 
 constexpr int kMostRepeats = 15;
 
+/// Of a sample, milliseconds.
+double costOf(const TimedCase& one, const RoundOptions& options) {
+    return std::max(one.firstMs, std::min(options.sampleMs, kMostRepeats * one.firstMs));
+}
+
 CaseSample sampleOf(const TimedCase& one, double sampleMs, const Execution& execution) {
     const double fit = one.firstMs > 0 ? sampleMs / one.firstMs : kMostRepeats;
     const int repeats = std::clamp(int(fit), 1, kMostRepeats) | 1;
@@ -142,10 +147,21 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         runFirst(one, rungs[one.ladder], options, execution);
         if (!one.leftOut.empty()) continue;
         timedOnes.push_back(&one);
-        roundMs += std::max(one.firstMs, std::min(options.sampleMs, kMostRepeats * one.firstMs));
+        roundMs += costOf(one, options);
     }
     // First runs are slower than later ones, so there is time for what is left.
-    const int rounds = std::min(options.rounds, std::max(kFewestRounds, int(options.longestMs / roundMs)));
+    const int fewest = std::min(options.rounds, kFewestRounds);
+    std::stable_sort(timedOnes.begin(), timedOnes.end(),
+                     [](const TimedCase* a, const TimedCase* b) { return a->firstMs < b->firstMs; });
+    while (timedOnes.size() > 1 && fewest * roundMs > options.longestMs) {
+        TimedCase& longest = *timedOnes.back();
+        longest.leftOut = fmt::format("{}: a run takes {:.2g} s, too long for {} rounds in {:g} s",
+                                      longest.what, longest.firstMs / 1000, fewest, options.longestMs / 1000);
+        roundMs -= costOf(longest, options);
+        timedOnes.pop_back();
+    }
+    if (timedOnes.empty()) return 0;
+    const int rounds = std::clamp(int(options.longestMs / roundMs), fewest, options.rounds);
     say(fmt::format("{} cases in {} rounds of about {:.2g} s\n", timedOnes.size(), rounds, roundMs / 1000));
     std::mt19937_64 random(options.seed);
     const auto runs = std::int64_t(timedOnes.size()) * rounds;
