@@ -197,7 +197,7 @@ std::string benchmarkText(const Json& document, std::size_t width) {
         text += wrapLine("Left out: " + sentence.get<std::string>(), width, 2) + "\n";
     for (const Json& sentence : document["advice"])
         text += wrapLine(sentence.get<std::string>(), width, 0) + "\n";
-    return text + comparedText(document, width);
+    return withoutControls(text + comparedText(document, width));
 }
 
 }  // namespace tessera

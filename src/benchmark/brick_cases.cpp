@@ -72,7 +72,7 @@ CaseSample runPlanned(const BrickCase& bricks, const Execution& execution) {
 CaseSample runByError(const BrickCase& bricks, const Execution& execution) {
     BrickResult result;
     CaseSample sample = timed([&] {
-        result = makeBricks(bricks, execution);
+        result = makeBricks(bricks, *bricks.mesh, execution);
         return result.statistics;
     });
     sample.stagesMs = {{"plan_ms", result.times.planMs}, {"measure_ms", result.times.verifyMs}};
@@ -81,7 +81,7 @@ CaseSample runByError(const BrickCase& bricks, const Execution& execution) {
 }
 
 void findOut(BrickCase& bricks, const Execution& execution) {
-    const BrickResult result = makeBricks(bricks, execution);
+    const BrickResult result = makeBricks(bricks, *bricks.mesh, execution);
     bricks.error = result.report.fields.at(0);
     bricks.stoppedBecause = result.stoppedBecause;
     bricks.measureMs = result.times.verifyMs;
@@ -145,8 +145,8 @@ TimedCase timedCase(BrickCase& bricks, const std::string& ladder) {
     return one;
 }
 
-BrickResult makeBricks(const BrickCase& bricks, const Execution& execution) {
-    return refineAndResample(*bricks.mesh, kFirstField, *bricks.variant->resampler, bricks.refine, execution);
+BrickResult makeBricks(const BrickCase& bricks, const TetMesh& mesh, const Execution& execution) {
+    return refineAndResample(mesh, kFirstField, *bricks.variant->resampler, bricks.refine, execution);
 }
 
 Json runJson(const BrickCase& bricks, const TimedCase& times) {

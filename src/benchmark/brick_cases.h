@@ -50,8 +50,8 @@ BrickCase focusCase(const BenchmarkVariant& variant, const TetMesh& mesh, int po
 /// it decides where to refine; otherwise it isn't.
 TimedCase timedCase(BrickCase& bricks, const std::string& ladder);
 
-/// All at once: with its error.
-BrickResult makeBricks(const BrickCase& bricks, const Execution& execution);
+/// All at once, with its error, of that mesh: the case's, or one like it.
+BrickResult makeBricks(const BrickCase& bricks, const TetMesh& mesh, const Execution& execution);
 
 /// As the document has it.
 Json runJson(const BrickCase& bricks, const TimedCase& times);

@@ -65,6 +65,12 @@ double largestRange(const Field& field) {
 
 }  // namespace
 
+std::string csvText(const std::string& text) {
+    std::string quoted = "\"";
+    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return quoted + '"';
+}
+
 ErrorFigures figuresOf(std::vector<double> errors) {
     ErrorFigures figures;
     figures.count = std::int64_t(errors.size());
@@ -154,7 +160,7 @@ std::string OraclePlaces::csv(const std::vector<std::string>& names,
                               const std::vector<OracleFigures>& figures) const {
     const auto components = std::size_t(mesh_.fields[std::size_t(field_)].components);
     std::string text = "lattice,i,j,k,x,y,z,spacing,exact";
-    for (const std::string& name : names) text += fmt::format(",\"{}\"", name);
+    for (const std::string& name : names) text += "," + csvText(name);
     text += '\n';
     for (std::size_t p = 0; p < places_.size(); ++p) {
         const Place& place = places_[p];

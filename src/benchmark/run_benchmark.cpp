@@ -76,9 +76,9 @@ Extent extentOf(const BenchmarkRequest& request) {
                   .bricks = {{16, 30}, {16, 300}, {64, 10000}},
                   .variationPoints = 128,
                   .mostRounds = 9,
-                  .paperPoints = 512,
-                  .elementsPoints = 128,
-                  .pictureSize = 512,
+                  .paperPoints = 256,
+                  .elementsPoints = 64,
+                  .pictureSize = 384,
                   .places = 1000,
                   .lattices = 4,
                   .seconds = 300,
@@ -108,15 +108,19 @@ std::string csvOf(const Json& runs) {
     std::string text =
         "variant,criterion,asked,voxels,covered,levels,spacing,median_ms,low_ms,high_ms,rounds,processor_ms,"
         "error_max,error_p999,error_rms,picture_rms,peak_memory_bytes\n";
-    const auto cell = [](const Json& value) { return value.is_null() ? std::string() : value.dump(); };
+    const auto cell = [](const Json& value) {
+        return value.is_null()     ? std::string()
+               : value.is_string() ? csvText(value.get<std::string>())
+                                   : value.dump();
+    };
     for (const Json& run : runs)
-        text += fmt::format("\"{}\",{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                            run["variant"].get<std::string>(), cell(run["criterion"]), cell(run["asked"]),
-                            cell(run["voxels"]), cell(run["covered"]), cell(run["levels"]),
-                            cell(run["spacing"]), cell(run["ms"]["median"]), cell(run["ms"]["low"]),
-                            cell(run["ms"]["high"]), cell(run["ms"]["count"]), cell(run["processor_ms"]),
-                            cell(run["error"]["max"]), cell(run["error"]["p999"]), cell(run["error"]["rms"]),
-                            cell(run["picture_rms"]), cell(run["peak_memory_bytes"]));
+        text +=
+            fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", cell(run["variant"]),
+                        cell(run["criterion"]), cell(run["asked"]), cell(run["voxels"]), cell(run["covered"]),
+                        cell(run["levels"]), cell(run["spacing"]), cell(run["ms"]["median"]),
+                        cell(run["ms"]["low"]), cell(run["ms"]["high"]), cell(run["ms"]["count"]),
+                        cell(run["processor_ms"]), cell(run["error"]["max"]), cell(run["error"]["p999"]),
+                        cell(run["error"]["rms"]), cell(run["picture_rms"]), cell(run["peak_memory_bytes"]));
     return text;
 }
 
@@ -139,6 +143,7 @@ class Benchmark {
     void add(WarmCase warm);
     void addPictures();
     void addMemory();
+    void leaveOut(const std::string& what, const std::function<void()>& work);
     Json oracleJson();
     Json againJson() const;
     Json runsJson() const;
@@ -216,6 +221,8 @@ void Benchmark::add(BrickCase bricks, const std::string& ladder, bool isOfElemen
         one.work = points > 0 ? points * points * points : 1 / std::max(kept.bound, 1e-3);
         if (kept.criterion == "element size") one.work = std::pow(kept.refine.samplesPerElement, 3);
     }
+    // Without the coarsest lattice of the first algorithm there would be nothing to tell.
+    one.isKept = cases_.empty();
     cases_.push_back(std::move(one));
 }
 
@@ -249,18 +256,25 @@ void Benchmark::addElementCases() {
     }
 }
 
+/// What fails by what a case may fail by is left out, with its reason.
+void Benchmark::leaveOut(const std::string& what, const std::function<void()>& work) {
+    if (const std::string why = whyItFailed(work); !why.empty())
+        absent_.push_back(fmt::format("{}: {}", what, why));
+}
+
 /// The device that samples may stay on; null without one.
 GlThread* Benchmark::device() {
-    for (const BenchmarkVariant& v : list_.variants)
-        if (v.resampler->info().isOnDevice && v.role == VariantRole::main) try {
-                std::optional<GlPlatform> wanted;
-                if (!request_.bind.target.empty()) wanted = parseGlPlatform(request_.bind.target);
-                return &sharedGlThread(chooseGlPlatform(wanted));
-            } catch (const GlError& error) {
-                absent_.push_back(fmt::format("No samples are left on a device: {}", error.what()));
-                return nullptr;
-            }
-    return nullptr;
+    GlThread* device = nullptr;
+    const bool isWanted = std::any_of(list_.variants.begin(), list_.variants.end(), [&](const auto& v) {
+        return isMain(v) && v.resampler->info().isOnDevice;
+    });
+    if (isWanted)
+        leaveOut("No samples are left on a device", [&] {
+            std::optional<GlPlatform> wanted;
+            if (!request_.bind.target.empty()) wanted = parseGlPlatform(request_.bind.target);
+            device = &sharedGlThread(chooseGlPlatform(wanted));
+        });
+    return device;
 }
 
 void Benchmark::add(WarmCase warm) {
@@ -287,13 +301,11 @@ void Benchmark::addWarmCases() {
 }
 
 void Benchmark::addPaperCases() {
-    try {
+    leaveOut("The grids of 2001", [&] {
         paper_.emplace(mesh_, std::filesystem::path(meshName_).stem().string(), list_.variants,
                        extent_.paperPoints, request_.isQuick ? 1 : 3);
-    } catch (const InputError& error) {
-        absent_.push_back(fmt::format("The grids of 2001 are left out: {}", error.what()));
-        return;
-    }
+    });
+    if (!paper_) return;
     paperAt_ = cases_.size();
     for (TimedCase& one : paper_->timedCases()) cases_.push_back(std::move(one));
     paperCount_ = cases_.size() - paperAt_;
@@ -302,6 +314,7 @@ void Benchmark::addPaperCases() {
 void Benchmark::addYardstick() {
     TimedCase one;
     one.what = "yardstick";
+    one.isKept = true;
     one.run = [](const Execution& execution) {
         CaseSample sample;
         sample.ms = runYardstick(execution.threadCount());
@@ -313,23 +326,22 @@ void Benchmark::addYardstick() {
 /// Of the first algorithm's bricks, peers' and those as published; others have the same values.
 void Benchmark::addPictures() {
     const Execution quiet = job_.execution.withoutProgress();
-    try {
-        const PictureReference reference(mesh_, mesh_.fields[0].name, extent_.pictureSize, quiet);
-        std::int64_t done = 0;
-        for (Bricks& one : bricks_) {
-            const BenchmarkVariant& v = *one.bricks.variant;
-            job_.execution.report(Stage::comparing, done++, std::int64_t(bricks_.size()));
-            const bool isWanted = &v == &list_.variants.front() || v.role == VariantRole::published ||
-                                  v.role == VariantRole::peer;
-            if (!isWanted || one.isOfElements || !cases_[one.at].isTimed()) continue;
-            BrickResult result = makeBricks(one.bricks, quiet);
+    std::optional<PictureReference> reference;
+    leaveOut("No pictures are compared",
+             [&] { reference.emplace(mesh_, mesh_.fields[0].name, extent_.pictureSize, quiet); });
+    std::int64_t done = 0;
+    for (Bricks& one : bricks_) {
+        const BenchmarkVariant& v = *one.bricks.variant;
+        job_.execution.report(Stage::comparing, done++, std::int64_t(bricks_.size()));
+        const bool isWanted =
+            &v == &list_.variants.front() || v.role == VariantRole::published || v.role == VariantRole::peer;
+        if (!reference || !isWanted || one.isOfElements || !cases_[one.at].isTimed()) continue;
+        leaveOut(cases_[one.at].what + ": no picture", [&] {
+            // A picture of a vector is that of its length, which is the field of the reference's mesh.
+            BrickResult result = makeBricks(one.bricks, reference->mesh(), quiet);
             one.bricks.pictureRms =
-                reference.measureDrawn(*v.resampler, one.bricks.refine, result, "", quiet).drawn.all;
-        }
-    } catch (const GlError& error) {
-        absent_.push_back(fmt::format("No pictures are compared: {}", error.what()));
-    } catch (const InputError& error) {
-        absent_.push_back(fmt::format("No pictures are compared: {}", error.what()));
+                reference->measureDrawn(*v.resampler, one.bricks.refine, result, "", quiet).drawn.all;
+        });
     }
 }
 
@@ -353,30 +365,35 @@ Json Benchmark::oracleJson() {
     options.places = extent_.places;
     options.lattices = extent_.lattices;
     options.seed = request_.seed;
-    const OraclePlaces places(mesh_, 0, options, quiet);
+    std::optional<OraclePlaces> places;
+    Json variants = Json::array();
     std::vector<std::string> names;
     std::vector<OracleFigures> all;
-    Json variants = Json::array();
     std::set<std::string> timedOnes;
     for (const Bricks& one : bricks_)
         if (cases_[one.at].isTimed()) timedOnes.insert(one.bricks.variant->name);
+    leaveOut("Nothing is checked against exact arithmetic",
+             [&] { places.emplace(mesh_, 0, options, quiet); });
+    if (!places) return {{"places", 0}, {"variants", std::move(variants)}};
     for (const BenchmarkVariant& v : list_.variants) {
         if (v.role == VariantRole::again || !timedOnes.count(v.name)) continue;
         job_.execution.report(Stage::checking, std::int64_t(all.size()), std::int64_t(list_.variants.size()));
-        OracleFigures figures = places.measure(*v.resampler, v.bind, quiet);
-        variants.push_back({{"variant", v.name},
-                            {"max", figures.error.max},
-                            {"p999", figures.error.p999},
-                            {"rms", figures.error.rms},
-                            {"places", figures.error.count},
-                            {"holes", figures.holes},
-                            {"spills", figures.spills}});
-        names.push_back(v.name);
-        all.push_back(std::move(figures));
+        leaveOut(v.name + " isn't checked against exact arithmetic", [&] {
+            OracleFigures figures = places->measure(*v.resampler, v.bind, quiet);
+            variants.push_back({{"variant", v.name},
+                                {"max", figures.error.max},
+                                {"p999", figures.error.p999},
+                                {"rms", figures.error.rms},
+                                {"places", figures.error.count},
+                                {"holes", figures.holes},
+                                {"spills", figures.spills}});
+            names.push_back(v.name);
+            all.push_back(std::move(figures));
+        });
     }
-    oracleCsv_ = places.csv(names, all);
-    return {{"places", places.count()},
-            {"lattices", places.latticeCount()},
+    oracleCsv_ = places->csv(names, all);
+    return {{"places", places->count()},
+            {"lattices", places->latticeCount()},
             {"spill_voxels", options.spillVoxels},
             {"file", "oracle.csv"},
             {"variants", std::move(variants)}};

@@ -93,6 +93,11 @@ struct Rung {
     bool isLeftOut = false;
 };
 
+/// A sentence with what the case is.
+std::string leftOutBecause(const TimedCase& one, const std::string& why) {
+    return why.empty() ? why : fmt::format("{}: {}", one.what, why);
+}
+
 void runFirst(TimedCase& one, Rung& rung, const RoundOptions& options, const Execution& execution) {
     const double expected =
         rung.work > 0 ? rung.ms * std::pow(std::max(1.0, one.work / rung.work), kGrowth) : 0;
@@ -101,23 +106,20 @@ void runFirst(TimedCase& one, Rung& rung, const RoundOptions& options, const Exe
             fmt::format("{}: a run would take more than {:g} s", one.what, options.longestRunMs / 1000);
         return;
     }
-    try {
+    const std::string why = whyItFailed([&] {
         const TimeLimit limit(execution, kPatience * options.longestRunMs);
-        if (one.prepare) one.prepare(limit.execution());
-        one.firstMs = one.run(limit.execution()).ms;
+        try {
+            if (one.prepare) one.prepare(limit.execution());
+            one.firstMs = one.run(limit.execution()).ms;
+        } catch (const Cancelled&) {
+            execution.throwIfCancelled();
+            throw InputError(
+                fmt::format("a run takes more than {:g} s", kPatience * options.longestRunMs / 1000));
+        }
         if (one.firstMs > options.longestRunMs)
-            one.leftOut = fmt::format("{}: a run takes {:.3g} s", one.what, one.firstMs / 1000);
-    } catch (const Cancelled&) {
-        execution.throwIfCancelled();
-        one.leftOut = fmt::format("{}: a run takes more than {:g} s", one.what,
-                                  kPatience * options.longestRunMs / 1000);
-    } catch (const InputError& error) {
-        one.leftOut = fmt::format("{}: {}", one.what, error.what());
-    } catch (const GlError& error) {
-        one.leftOut = fmt::format("{}: {}", one.what, error.what());
-    } catch (const IoError& error) {
-        one.leftOut = fmt::format("{}: {}", one.what, error.what());
-    }
+            throw InputError(fmt::format("a run takes {:.3g} s", one.firstMs / 1000));
+    });
+    one.leftOut = leftOutBecause(one, why);
     rung = {one.firstMs, one.work, !one.leftOut.empty()};
 }
 
@@ -151,9 +153,10 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
     }
     // First runs are slower than later ones, so there is time for what is left.
     const int fewest = std::min(options.rounds, kFewestRounds);
-    std::stable_sort(timedOnes.begin(), timedOnes.end(),
-                     [](const TimedCase* a, const TimedCase* b) { return a->firstMs < b->firstMs; });
-    while (timedOnes.size() > 1 && fewest * roundMs > options.longestMs) {
+    std::stable_sort(timedOnes.begin(), timedOnes.end(), [](const TimedCase* a, const TimedCase* b) {
+        return a->isKept != b->isKept ? a->isKept : a->firstMs < b->firstMs;
+    });
+    while (!timedOnes.empty() && !timedOnes.back()->isKept && fewest * roundMs > options.longestMs) {
         TimedCase& longest = *timedOnes.back();
         longest.leftOut = fmt::format("{}: a run takes {:.2g} s, too long for {} rounds in {:g} s",
                                       longest.what, longest.firstMs / 1000, fewest, options.longestMs / 1000);
@@ -170,9 +173,27 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
         if (place == 0) std::shuffle(timedOnes.begin(), timedOnes.end(), random);
         execution.report(Stage::sampling, run, runs);
         TimedCase& one = *timedOnes[place];
-        one.samples.push_back(sampleOf(one, options.sampleMs, execution.withoutProgress()));
+        if (!one.leftOut.empty()) continue;
+        one.leftOut = leftOutBecause(
+            one, whyItFailed([&] {
+                one.samples.push_back(sampleOf(one, options.sampleMs, execution.withoutProgress()));
+            }));
+        if (!one.leftOut.empty()) one.samples.clear();
     }
     return rounds;
+}
+
+std::string whyItFailed(const std::function<void()>& work) {
+    try {
+        work();
+        return {};
+    } catch (const InputError& error) {
+        return error.what();
+    } catch (const GlError& error) {
+        return error.what();
+    } catch (const IoError& error) {
+        return error.what();
+    }
 }
 
 MedianInterval ratioOf(const TimedCase& first, const TimedCase& second) {

@@ -29,6 +29,7 @@ struct TimedCase {
     /// Once, before all else: finds out what isn't timed. Takes about as long as a run. May be null.
     std::function<void(const Execution&)> prepare;
     std::function<CaseSample(const Execution&)> run;
+    bool isKept = false;  ///< not left out for want of time
 
     std::vector<CaseSample> samples;  ///< of the rounds
     double firstMs = 0;               ///< of the run before them, shaders and caches cold
@@ -57,6 +58,10 @@ struct RoundOptions {
 /// @param say one line about what is going on.
 int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Execution& execution,
               const std::function<void(const std::string&)>& say);
+
+/// Does the work; where it fails by what a case may fail by, bad input for it, its device or its program,
+/// why.
+std::string whyItFailed(const std::function<void()>& work);
 
 /// Of two cases that ran in the same rounds: the second's time over the first's, round by round.
 MedianInterval ratioOf(const TimedCase& first, const TimedCase& second);
