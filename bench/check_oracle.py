@@ -87,6 +87,9 @@ def main():
     parser.add_argument("--places", type=int, default=1000)
     arguments = parser.parse_args()
     report = json.loads((arguments.folder / "report.json").read_text())
+    if report["input"]["components"] != 1:
+        print(f"{report['input']['field']}: it isn't a scalar field; oracle.csv has one component only", file=sys.stderr)
+        return 2
     given, field_range = report["input"], Fraction(report["input"]["range"])
     mesh = Mesh(*read_mesh(arguments.mesh, given["field"], given["location"]), given["location"])
     with open(arguments.folder / "oracle.csv", newline="") as file:
@@ -105,7 +108,8 @@ def main():
         for name in names:
             sample = float(numpy.float32(row[name]))  # as shortly as a 32-bit float is written
             if math.isfinite(sample):
-                errors[name].append(min(abs(Fraction(sample) - value) for value in exact) / field_range)
+                error = min(abs(Fraction(sample) - value) for value in exact)
+                errors[name].append(error / field_range if field_range else Fraction(0))
     if missing:
         problems.append(f"{missing} places lie in no element")
     for variant in report["oracle"]["variants"]:

@@ -287,7 +287,7 @@ int main(int count, char** words) {
         for (const std::string& path : options.meshPaths) measure(options, path, readMesh(path, {}, {}).mesh);
         if (options.meshPaths.empty())
             for (const std::int64_t elements : options.elements)
-                measure(options, "graded box", bench::gradedBox(elements));
+                measure(options, "graded box", gradedBox(elements));
         return 0;
     });
 }

@@ -20,8 +20,8 @@
 #include "base/timer.h"
 #include "bench_statistics.h"
 #include "mesh_files/read_vtu.h"
-#include "reader/isolated_reader.h"
 #include "read_by_vtk.h"
+#include "reader/isolated_reader.h"
 
 namespace {
 

@@ -264,7 +264,7 @@ int main(int count, char** words) {
     arguments.add("--csv", options.csvPath, "writes the table there, too");
     return arguments.run(count, words, [&] {
         const TetMesh mesh =
-            options.meshPath.empty() ? bench::gradedBox(100'000) : readMesh(options.meshPath, {}, {}).mesh;
+            options.meshPath.empty() ? gradedBox(100'000) : readMesh(options.meshPath, {}, {}).mesh;
         const int field = options.field.empty() ? 0 : mesh.findField(options.field);
         if (field < 0 || mesh.fields.empty()) throw InputError("no field " + options.field);
         if (!(options.rise >= 0 && options.rise <= 0.5)) throw InputError("--rise is a share from 0 to 0.5");

@@ -646,8 +646,9 @@ void addBenchOptions(CLI::App& command, BenchArguments& a) {
         ->check(CLI::Range(1, 1000));
     command
         .add_option("--seconds", a.request.seconds,
-                    "for all rounds together: there are fewer, but 6, where they would take longer "
-                    "(default: 420, quick 24)")
+                    "for all rounds together, beside one first run of each case: there are fewer where they "
+                    "would take longer, and where 6 would, the longest cases are left out (default: 300, "
+                    "quick 24)")
         ->check(CLI::Range(1.0, 1e6));
     command
         .add_option("--longest-run", a.request.longestSeconds,

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <optional>
@@ -61,19 +63,20 @@ Json noneJson(const char* how) {
     return {{"ms", nullptr}, {"voxels", nullptr}, {"resolution", nullptr}, {"how", how}};
 }
 
-Json measuredJson(const Json& run) {
-    return {
-        {"ms", run["ms"]}, {"voxels", run["voxels"]}, {"resolution", run["resolution"]}, {"how", "measured"}};
+Json measuredJson(const Json& run, const char* how) {
+    return {{"ms", run["ms"]}, {"voxels", run["voxels"]}, {"resolution", run["resolution"]}, {"how", how}};
 }
 
-Json reachJson(const std::vector<Rung>& ladder, double bound) {
+Json reachJson(const std::vector<Rung>& ladder, double bound, bool isLargest) {
+    // Refinement by error was asked for a bound on the largest error.
     for (const Rung& rung : ladder)
-        if (numberOr((*rung.run)["bound"], 0) == bound && rung.error <= bound) return measuredJson(*rung.run);
+        if (isLargest && numberOr((*rung.run)["bound"], 0) == bound && rung.error <= bound)
+            return measuredJson(*rung.run, "measured");
     // Errors needn't fall with every step: the first from which on all are within the bound.
     std::size_t first = ladder.size();
     while (first > 0 && ladder[first - 1].error <= bound) --first;
     if (first == ladder.size()) return noneJson("not reached");
-    if (first == 0) return measuredJson(*ladder[0].run);
+    if (first == 0) return measuredJson(*ladder[0].run, "coarsest tried");
     const Rung &coarse = ladder[first - 1], &fine = ladder[first];
     const double share = fine.error > 0 ? (std::log(coarse.error) - std::log(bound)) /
                                               (std::log(coarse.error) - std::log(fine.error))
@@ -126,6 +129,17 @@ Json fitJson(const std::string& variant, const Json& points) {
     return json;
 }
 
+/// A word for a shell.
+std::string shellWord(const std::string& word) {
+    const auto isPlain = [](char c) {
+        return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./:+,@%", c);
+    };
+    if (!word.empty() && std::all_of(word.begin(), word.end(), isPlain)) return word;
+    std::string quoted = "'";
+    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    return quoted + "'";
+}
+
 std::string secondsText(double ms) {
     return ms < 1000 ? fmt::format("{:.3g} ms", ms) : fmt::format("{:.3g} s", ms / 1000);
 }
@@ -150,7 +164,19 @@ const Json* quickest(const Json& entries, double bound, const std::string& crite
     return best;
 }
 
-std::string adviceForBound(const Json& document, const std::string& mesh, double bound) {
+/// The command that makes such bricks; nothing where the mesh is no file.
+std::string commandFor(const Json& document, const Json& entry, const std::string& how) {
+    const std::string mesh = document["input"]["file"].is_string() ? document["input"]["file"] : "";
+    if (mesh.empty()) return {};
+    std::string algorithm;
+    for (const Json& variant : document["variants"])
+        if (variant["name"] == entry["variant"]) algorithm = variant["algorithm"];
+    const std::string where = document["input"]["location"] == "cell" ? "cell:" : "point:";
+    return fmt::format(" (tessera resample {} -o out.vdb --field {} --algorithm {} {})", shellWord(mesh),
+                       shellWord(where + document["input"]["field"].get<std::string>()), algorithm, how);
+}
+
+std::string adviceForBound(const Json& document, double bound) {
     const auto roles = rolesOf(document["variants"]);
     const Json& entries = document["equal_error"];
     const Json* uniform = quickest(entries, bound, "uniform", roles, "main");
@@ -164,17 +190,19 @@ std::string adviceForBound(const Json& document, const std::string& mesh, double
                                                        (*byError)["ms"]["median"].get<double>());
     if (isUniform) {
         const double resolution = std::ceil(numberOr((*uniform)["resolution"], 0));
-        std::string text = fmt::format(
-            "For a largest error of {:g} %, a uniform lattice of {:.0f} points is the quickest: {} (tessera "
-            "resample {} --refine uniform --resolution {:.0f}).",
-            100 * bound, resolution, costs(*uniform), mesh, resolution);
+        const std::string how = fmt::format("--refine uniform --resolution {:.0f}", resolution);
+        std::string text =
+            fmt::format("For a largest error of {:g} %, {} of {:.0f} points is {}: {}{}.", 100 * bound,
+                        (*uniform)["how"] == "coarsest tried" ? "the coarsest lattice that was tried"
+                                                              : "a uniform lattice",
+                        resolution, (*uniform)["how"] == "coarsest tried" ? "enough" : "the quickest",
+                        costs(*uniform), commandFor(document, *uniform, how));
         if (byError) text += fmt::format(" Bricks by error take {}.", costs(*byError));
         return text;
     }
     std::string text = fmt::format(
-        "For a largest error of {:g} %, take bricks by error: {} (tessera resample {} --refine error "
-        "--max-error {:g}%).",
-        100 * bound, costs(*byError), mesh, 100 * bound);
+        "For a largest error of {:g} %, take bricks by error: {}{}.", 100 * bound, costs(*byError),
+        commandFor(document, *byError, fmt::format("--refine error --max-error {:g}%", 100 * bound)));
     text += uniform ? fmt::format(" A uniform lattice takes {}.", costs(*uniform))
                     : std::string(" No uniform lattice that was tried is so close.");
     return text;
@@ -208,22 +236,23 @@ std::string adviceOnPeers(const Json& document) {
     std::string text;
     for (const Json& variant : document["variants"]) {
         if (variant["role"] != "peer") continue;
-        const Json* slow = nullptr;
+        const Json* finest = nullptr;
         for (const Json& run : document["runs"])
             if (run["variant"] == variant["name"] && run["criterion"] == "uniform" &&
-                (!slow || numberOr(run["resolution"], 0) > numberOr((*slow)["resolution"], 0)))
-                slow = &run;
-        if (!slow) continue;
+                (!finest || numberOr(run["resolution"], 0) > numberOr((*finest)["resolution"], 0)))
+                finest = &run;
+        if (!finest) continue;
         double best = std::numeric_limits<double>::infinity();
         for (const Json& run : document["runs"])
-            if (run["criterion"] == "uniform" && run["resolution"] == (*slow)["resolution"] &&
+            if (run["criterion"] == "uniform" && run["resolution"] == (*finest)["resolution"] &&
                 roles.at(run["variant"]) == "main")
                 best = std::min(best, run["ms"]["median"].get<double>());
         if (!std::isfinite(best)) continue;
-        text += fmt::format(
-            "{}At {:.0f} points {} takes {}, {:.3g} times the quickest algorithm.", text.empty() ? "" : " ",
-            numberOr((*slow)["resolution"], 0), variant["name"].get<std::string>(),
-            secondsText((*slow)["ms"]["median"].get<double>()), (*slow)["ms"]["median"].get<double>() / best);
+        text += fmt::format("{}At {:.0f} points {} takes {}, {:.3g} times the quickest algorithm.",
+                            text.empty() ? "" : " ", numberOr((*finest)["resolution"], 0),
+                            variant["name"].get<std::string>(),
+                            secondsText((*finest)["ms"]["median"].get<double>()),
+                            (*finest)["ms"]["median"].get<double>() / best);
     }
     return text;
 }
@@ -262,12 +291,13 @@ Json equalErrorJson(const Json& runs) {
                 for (const char* criterion : {"uniform", "error"}) {
                     const std::vector<Rung> ladder = ladderOf(runs, variant, criterion, measure);
                     // A single lattice says nothing about others.
-                    if (ladder.empty() || (ladder.size() == 1 && ladder[0].error > bound)) continue;
+                    if (ladder.empty() || (ladder.size() == 1 && criterion == std::string("uniform")))
+                        continue;
                     Json entry{{"measure", measure},
                                {"bound", bound},
                                {"variant", variant},
                                {"criterion", criterion}};
-                    entry.update(reachJson(ladder, bound));
+                    entry.update(reachJson(ladder, bound, measure == std::string("max")));
                     all.push_back(std::move(entry));
                 }
     return all;
@@ -353,13 +383,13 @@ Json rooflineJson(const Json& runs, const Json& variants, double meshBytes, int 
     return {{"machine", std::move(machine)}, {"runs", std::move(all)}};
 }
 
-std::vector<std::string> adviceOn(const Json& document, const std::string& mesh) {
+std::vector<std::string> adviceOn(const Json& document) {
     std::vector<std::string> sentences;
     const auto add = [&](std::string text) {
         if (!text.empty()) sentences.push_back(std::move(text));
     };
     add(adviceOnAlgorithm(document));
-    for (const double bound : {0.05, 0.01}) add(adviceForBound(document, mesh, bound));
+    for (const double bound : {0.1, 0.05, 0.01}) add(adviceForBound(document, bound));
     add(adviceOnPeers(document));
     return sentences;
 }

@@ -31,7 +31,7 @@ Json scalingJson(const Json& points);
 /// Uniform runs against what the least bytes take: mesh read once, samples written once.
 Json rooflineJson(const Json& runs, const Json& variants, double meshBytes, int channels,
                   const std::vector<MachineRates>& rates);
-/// What to take, in sentences. @param mesh the file's name.
-std::vector<std::string> adviceOn(const Json& document, const std::string& mesh);
+/// What to take, in sentences.
+std::vector<std::string> adviceOn(const Json& document);
 
 }  // namespace tessera

@@ -17,15 +17,15 @@ namespace {
 
 class Lister {
   public:
-    Lister(const BenchmarkRequest& request, int threads) : request_(request), threads_(threads) {}
+    Lister(const BenchmarkRequest& request, const Execution& execution)
+        : request_(request), execution_(execution), threads_(execution.threadCount()) {}
 
     VariantList run() {
         addMain();
         if (!list_.variants.empty()) {
             BenchmarkVariant again = list_.variants.front();
             again.name += " again";
-            again.role = VariantRole::again;
-            list_.variants.push_back(again);
+            add(again.name, VariantRole::again, *again.resampler, again.bind, again.threads);
         }
         if (request_.algorithms.empty()) {
             const std::vector<BenchmarkVariant> all = list_.variants;
@@ -100,13 +100,15 @@ class Lister {
                 list_.absent.push_back("VTK is left out: its program isn't beside this one");
         }
         commands.insert(commands.end(), request_.peers.begin(), request_.peers.end());
-        for (const PeerCommand& command : commands) {
+        for (PeerCommand& command : commands) {
+            command.cancel = execution_.cancel;
             list_.peers.push_back(makePeer(command));
             add(command.name, VariantRole::peer, *list_.peers.back(), {}, threads_);
         }
     }
 
     const BenchmarkRequest& request_;
+    const Execution& execution_;
     int threads_;
     VariantList list_;
     std::set<std::string> names_;
@@ -130,8 +132,8 @@ std::string_view nameOf(VariantRole role) {
     return "main";
 }
 
-VariantList listVariants(const BenchmarkRequest& request, int threads) {
-    return Lister(request, threads).run();
+VariantList listVariants(const BenchmarkRequest& request, const Execution& execution) {
+    return Lister(request, execution).run();
 }
 
 Json variantJson(const BenchmarkVariant& variant) {

@@ -38,7 +38,8 @@ struct VariantList {
 
 /// The main ones first, then the rest in the order of VariantRole. Where algorithms are named there are these
 /// and the peers only, the first of them twice. Throws InputError for a name there isn't.
-VariantList listVariants(const BenchmarkRequest& request, int threads);
+/// @param execution its threads, and what may end the wait for a peer.
+VariantList listVariants(const BenchmarkRequest& request, const Execution& execution);
 
 Json variantJson(const BenchmarkVariant& variant);
 

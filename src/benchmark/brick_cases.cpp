@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include "base/timer.h"
 #include "benchmark/peer_resampler.h"
@@ -39,11 +41,51 @@ Execution executionOf(const BrickCase& bricks, const Execution& execution) {
 
 void addStatistics(const ResampleStatistics& statistics, CaseSample& sample) {
     sample.statistics = statistics;
+    // Where something is drawn, sampling is made of the stages that are told apart.
+    const bool isDrawn = statistics.ms(stage::render) > 0;
     for (const auto& [name, ms] : statistics.stages())
-        if (name != kTransferStage) sample.stagesMs.emplace_back(name, ms);
+        if (name != kTransferStage && !(isDrawn && name == stage::sample))
+            sample.stagesMs.emplace_back(name, ms);
     // What a peer's samples take on their way isn't its sampling.
     sample.ms -= statistics.ms(kTransferStage);
 }
+
+/// What a resampler's bind takes, and the end of what it bound.
+class TimedBinding : public Resampler {
+  public:
+    explicit TimedBinding(const Resampler& inner) : Resampler(inner.info()), inner_(inner) {}
+    double ms() const { return ms_; }
+
+    std::unique_ptr<BoundResampler> bind(const TetMesh& mesh, std::span<const int> fields,
+                                         const BindOptions& options) const override {
+        const Timer timer;
+        auto bound = std::make_unique<Bound>(inner_.bind(mesh, fields, options), ms_);
+        ms_ += timer.elapsedMs();
+        return bound;
+    }
+
+  private:
+    class Bound : public BoundResampler {
+      public:
+        Bound(std::unique_ptr<BoundResampler> inner, double& ms) : inner_(std::move(inner)), ms_(ms) {}
+        ~Bound() override {
+            const Timer timer;
+            inner_.reset();
+            ms_ += timer.elapsedMs();
+        }
+        std::string_view target() const override { return inner_->target(); }
+        ResampleStatistics resample(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                    const BlockSink& sink, const Execution& execution) override {
+            return inner_->resample(lattice, boxes, sink, execution);
+        }
+
+      private:
+        std::unique_ptr<BoundResampler> inner_;
+        double& ms_;
+    };
+    const Resampler& inner_;
+    mutable double ms_ = 0;
+};
 
 /// Planned, bound and sampled; what is measured elsewhere isn't done.
 CaseSample runPlanned(const BrickCase& bricks, const Execution& execution) {
@@ -60,22 +102,29 @@ CaseSample runPlanned(const BrickCase& bricks, const Execution& execution) {
         store = resampleTree(tree, *bound, channelsOf(*bricks.mesh), execution, statistics);
         return statistics;
     });
-    sample.stagesMs = {{"plan_ms", planMs}};
-    if (bricks.variant->role == VariantRole::peer)
-        sample.ms -= bindMs;  // it reads a file there
-    else
-        sample.stagesMs.emplace_back("bind_ms", bindMs);
+    if (bricks.variant->role == VariantRole::peer) {
+        // Its own sampling, as it says: neither our plan, nor its start and the mesh's way there.
+        addStatistics(sample.statistics, sample);
+        sample.ms = sample.statistics.ms(stage::sample);
+        return sample;
+    }
+    sample.stagesMs = {{"plan_ms", planMs}, {"bind_ms", bindMs}};
     addStatistics(sample.statistics, sample);
     return sample;
 }
 
 CaseSample runByError(const BrickCase& bricks, const Execution& execution) {
     BrickResult result;
+    const TimedBinding binding(*bricks.variant->resampler);
+    const bool isPeer = bricks.variant->role == VariantRole::peer;
     CaseSample sample = timed([&] {
-        result = makeBricks(bricks, *bricks.mesh, execution);
+        result = refineAndResample(*bricks.mesh, kFirstField, isPeer ? binding : *bricks.variant->resampler,
+                                   bricks.refine, execution);
         return result.statistics;
     });
-    sample.stagesMs = {{"plan_ms", result.times.planMs}, {"measure_ms", result.times.verifyMs}};
+    sample.ms -= binding.ms();
+    sample.stagesMs = {{"plan_ms", result.times.planMs - std::min(result.times.planMs, binding.ms())},
+                       {"measure_ms", result.times.verifyMs}};
     addStatistics(sample.statistics, sample);
     return sample;
 }
@@ -161,26 +210,29 @@ Json runJson(const BrickCase& bricks, const TimedCase& times) {
     for (const auto& [name, value] : times.samples.back().statistics.counts())
         counts[std::string(name)] = value;
     const double range = bricks.error.range;
+    const bool isPeer = bricks.variant->role == VariantRole::peer;  // in a process of its own
     const auto share = [&](double error) { return range > 0 ? Json(error / range) : Json(nullptr); };
-    Json json{{"variant", bricks.variant->name},
-              {"criterion", bricks.criterion},
-              {"asked", bricks.asked},
-              {"resolution", bricks.refine.resolution > 0 ? Json(bricks.refine.resolution) : Json(nullptr)},
-              {"bound", bricks.bound > 0 ? Json(bricks.bound) : Json(nullptr)},
-              {"stopped_because", bricks.stoppedBecause},
-              {"levels", bricks.levels},
-              {"spacing", bricks.spacingWorld},
-              {"voxels", bricks.voxels},
-              {"covered", bricks.covered},
-              {"ms", intervalJson(times.interval())},
-              {"processor_ms", times.medianOf([](const CaseSample& s) { return s.processorMs; })},
-              {"stages_ms", std::move(stages)},
-              {"measure_ms", bricks.measureMs},
-              {"counts", std::move(counts)},
-              {"error",
-               {{"max", share(bricks.error.max)},
-                {"p999", share(bricks.error.p999)},
-                {"rms", share(bricks.error.rms)}}}};
+    Json json{
+        {"variant", bricks.variant->name},
+        {"criterion", bricks.criterion},
+        {"asked", bricks.asked},
+        {"resolution", bricks.refine.resolution > 0 ? Json(bricks.refine.resolution) : Json(nullptr)},
+        {"bound", bricks.bound > 0 ? Json(bricks.bound) : Json(nullptr)},
+        {"stopped_because", bricks.stoppedBecause},
+        {"levels", bricks.levels},
+        {"spacing", bricks.spacingWorld},
+        {"voxels", bricks.voxels},
+        {"covered", bricks.covered},
+        {"ms", intervalJson(times.interval())},
+        {"processor_ms",
+         isPeer ? Json(nullptr) : Json(times.medianOf([](const CaseSample& s) { return s.processorMs; }))},
+        {"stages_ms", std::move(stages)},
+        {"measure_ms", bricks.measureMs},
+        {"counts", std::move(counts)},
+        {"error",
+         {{"max", share(bricks.error.max)},
+          {"p999", share(bricks.error.p999)},
+          {"rms", share(bricks.error.rms)}}}};
     json["picture_rms"] = bricks.pictureRms ? Json(*bricks.pictureRms) : Json(nullptr);
     json["peak_memory_bytes"] = bricks.peakMemoryBytes ? Json(*bricks.peakMemoryBytes) : Json(nullptr);
     return json;

@@ -121,7 +121,7 @@ double OraclePlaces::errorAt(const Place& place, std::span<const float> values) 
             square += (double(values[c]) - exact[c]) * (double(values[c]) - exact[c]);
         least = std::min(least, std::sqrt(square));
     }
-    return range_ > 0 ? least / range_ : 0;
+    return range_ > 0 || !std::isfinite(least) ? least / range_ : 0;
 }
 
 OracleFigures OraclePlaces::measure(const Resampler& resampler, const BindOptions& bind,

@@ -120,7 +120,9 @@ PageTable equalErrorTable(const PageSource& source, const std::vector<EqualError
                 for (const EqualError& e : all)
                     if (e.variant == &variant && e.measure == measure && e.criterion == criterion &&
                         e.bound == bound)
-                        row.back() = e.time ? timeText(e.time->median) : std::string(kNotReached),
+                        row.back() =
+                            !e.time ? std::string(kNotReached)
+                                    : (e.how == "coarsest tried" ? "\u2264 " : "") + timeText(e.time->median),
                         isKnown = true;
             }
             if (isKnown) table.rows.push_back(std::move(row));
@@ -378,8 +380,9 @@ std::string equalErrorSection(const PageSource& source) {
     if (all.empty()) return {};
     std::string html = paragraphHtml(
         "How long each takes until its errors are small enough. Errors are shares of the field's range, at "
-        "any place "
-        "in the mesh. An open circle is a uniform grid, a filled diamond one that is finer where the error "
+        "every node of the mesh and in the middle of every element; \u2264: even the coarsest grid that was "
+        "tried is "
+        "close enough. An open circle is a uniform grid, a filled diamond one that is finer where the error "
         "asks for it. "
         "Lines through marks are 95 % intervals.");
     for (const char* const measure : kMeasures) {
@@ -423,9 +426,8 @@ std::string errorTimeSection(const PageSource& source) {
         "there "
         "sooner: the best are at the lower right. The broad band joins the runs that no other beats in both, "
         "of all "
-        "grids; they are ringed, numbered and listed below. Thin grey lines are variations. Other programs "
-        "make uniform "
-        "grids only, and are repeated beside the adaptive ones.");
+        "grids; they are ringed, numbered and listed below. Thin grey lines are variations. Uniform grids "
+        "of other programs are repeated beside the adaptive ones.");
     for (const char* const measure : kMeasures) html += paragraphHtml(frontSentence(source, measure), "says");
     html += figure;
     for (const char* const measure : kMeasures)

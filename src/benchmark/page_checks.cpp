@@ -268,7 +268,8 @@ std::string factsHtml(const PageSource& source) {
 std::string settingsSentence(const Json& settings) {
     std::string text;
     if (const auto rounds = numberOf(partOf(settings, "rounds"))) {
-        text = fmt::format("Everything was timed in {} rounds", wholeText(*rounds));
+        text =
+            fmt::format("Everything was timed in {} rounds, after a first run of each", wholeText(*rounds));
         if (const auto seconds = numberOf(partOf(settings, "seconds")))
             text += fmt::format(", {} in all", *seconds >= 120
                                                    ? threeDigits(*seconds / 60) + kThinSpace + "minutes"
@@ -278,7 +279,8 @@ std::string settingsSentence(const Json& settings) {
     text +=
         " Each round takes all variants in another random order, so that what else the machine does meets "
         "all alike. "
-        "Times are medians; their intervals hold the true median in 95 of 100 cases.";
+        "Times are medians; their intervals hold the true median in 95 of 100 cases where there are six "
+        "rounds or more.";
     if (isTrue(partOf(settings, "quick"))) text += " This was a quick run: fewer rounds and cases.";
     if (const auto seed = numberOf(partOf(settings, "seed")))
         text += fmt::format(" The order comes from seed {}.", wholeText(*seed));

@@ -364,8 +364,8 @@ std::string stagesSection(const PageSource& source) {
         "stages", "What the time is spent on",
         paragraphHtml(fmt::format(
             "A uniform grid of {} points along its longest side. Each bar is the whole time of one "
-            "variant, which stands at its end; its parts are the stages. Other programs don't tell their "
-            "stages apart.",
+            "variant, which stands at its end; its parts are the stages. Of other programs there "
+            "is nothing but their sampling.",
             wholeText(*resolution))) +
             paragraphHtml(stagesSentence(source, *resolution), "says") + figure +
             detailsHtml("All stages in figures", stagesTable(source, *resolution)));
@@ -406,12 +406,14 @@ PlotFigure rooflineFigure(const PageSource& source) {
 std::string rooflineSection(const PageSource& source) {
     const std::string figure = figureHtml(rooflineFigure(source)), rates = ratesTable(source);
     if (figure.empty() && rates.empty()) return {};
-    return sectionHtml("roofline", "How near to what memory allows",
-                       paragraphHtml("The mesh has to be read and the voxels have to be written once. What "
-                                     "this machine's memory needs for "
-                                     "that alone is the dashed line; nothing can be below it.") +
-                           paragraphHtml(rooflineSentence(source), "says") + besideHtml(figure, rates) +
-                           detailsHtml("All of it in figures", rooflineTable(source)));
+    return sectionHtml(
+        "roofline", "How near to what memory allows",
+        paragraphHtml(
+            "The mesh has to be read and the voxels have to be written once. What "
+            "this machine's memory needs for "
+            "that alone is the dashed line; what fits into caches aside, nothing can be below it.") +
+            paragraphHtml(rooflineSentence(source), "says") + besideHtml(figure, rates) +
+            detailsHtml("All of it in figures", rooflineTable(source)));
 }
 
 std::string warmSection(const PageSource& source) {

@@ -21,8 +21,9 @@ constexpr const char* kLegend =
     "Published: M. Weiler and T. Ertl, Hardware-Software-Balanced Resampling for the Interactive "
     "Visualization of Unstructured Grids, IEEE Visualization 2001, figures 9 to 11 (Athlon 900 MHz, GeForce2 "
     "GTS; reading slices back not included). Their bluntfin had 220K tetrahedra. WestSingle and WestM/C are "
-    "their versions of an earlier method, not part of Tessera. Here: wall clock, everything, reading back "
-    "included. Ael: active list and generation of polygons or instances. Rnd: upload and rendering. Stages "
+    "their versions of an earlier method, not part of Tessera. Here: wall clock of sampling, reading "
+    "back included, by what is bound to the mesh already; peers build their search structures each time. "
+    "Ael: active list and generation of polygons or instances. Rnd: upload and rendering. Stages "
     "may overlap. Polygons: before they are grown; the paper slices along z, Tessera along the axis with the "
     "fewest pairs of element and slice.";
 

@@ -20,8 +20,8 @@ class PaperCases {
   public:
     /// @param variants those that are timed: software, hybrid and slicing with primitives by the processor,
     /// as they were published, and peers; found by their roles and algorithms. @param mostPoints along an
-    /// axis: larger grids are left out. @param mostSets of the mesh and its multiples. @param mostSets of the
-    /// mesh and its multiples. The variants must outlive it.
+    /// axis: larger grids are left out. @param mostSets of the mesh and its multiples. The variants must
+    /// outlive it.
     PaperCases(const TetMesh& mesh, const std::string& meshName, std::span<const BenchmarkVariant> variants,
                int mostPoints, std::size_t mostSets);
 

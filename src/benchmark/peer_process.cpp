@@ -55,7 +55,8 @@ std::string lastLineOf(const std::string& path) {
 PeerProcess::PeerProcess(const PeerCommand& peer, const std::string& meshPath, std::string logPath)
     : peer_(peer), logPath_(std::move(logPath)) {
     start(meshPath);
-    const nlohmann::ordered_json line = parse(exchange({}, kExpectedTitle, {}), kExpectedTitle);
+    const nlohmann::ordered_json line =
+        parse(exchange({}, kExpectedTitle, {.threads = 0, .cancel = peer_.cancel}), kExpectedTitle);
     const auto title = line.find("peer");
     if (title == line.end() || !title->is_string() || title->get<std::string>().empty())
         fail(kExpectedTitle, "it said " + line.dump());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -17,6 +18,8 @@ struct PeerCommand {
     std::string name;     ///< in tables and plots
     std::string command;  ///< a program and its arguments as in /bin/sh; the mesh's path comes behind them
     double timeoutMs = kPeerTimeoutMs;
+    /// Ends the wait for a peer that starts, when it turns true; may be null.
+    const std::atomic<bool>* cancel = nullptr;
 };
 
 /// A running peer, spoken to in lines of JSON over its standard input and output: docs/benchmark_peers.md.

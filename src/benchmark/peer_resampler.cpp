@@ -266,11 +266,20 @@ class PeerResampler : public Resampler {
         if (!options.target.empty() && options.target != targets().front())
             throw InputError("the peer " + name() + " has no target named " + options.target);
         if (fields.empty()) throw InputError("the peer " + name() + " needs a field to sample");
-        return std::make_unique<BoundPeer>(peer_, mesh, fields);
+        const std::lock_guard lock(mutex_);
+        if (!failure_.empty()) throw IoError(failure_);
+        try {
+            return std::make_unique<BoundPeer>(peer_, mesh, fields);
+        } catch (const IoError& error) {
+            failure_ = error.what();  // one that doesn't start won't the next time
+            throw;
+        }
     }
 
   private:
     PeerCommand peer_;
+    mutable std::mutex mutex_;
+    mutable std::string failure_;
 };
 
 /// As one word of /bin/sh.

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <deque>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <set>
 
 #include "base/timer.h"
@@ -35,6 +37,8 @@
 namespace tessera {
 
 namespace {
+
+constexpr std::size_t kMostPageBytes = 1'000'000;
 
 /// How much is done.
 struct Extent {
@@ -87,6 +91,8 @@ Extent extentOf(const BenchmarkRequest& request) {
     if (!request.resolutions.empty()) {
         extent.resolutions = request.resolutions;
         std::sort(extent.resolutions.begin(), extent.resolutions.end());
+        extent.resolutions.erase(std::unique(extent.resolutions.begin(), extent.resolutions.end()),
+                                 extent.resolutions.end());
         extent.variationPoints = extent.resolutions[extent.resolutions.size() / 2];
     }
     for (const int points : extent.resolutions)
@@ -172,6 +178,7 @@ class Benchmark {
     std::string meshName_;
     VariantList list_;
     std::vector<TimedCase> cases_;
+    std::map<std::string, int> ladderCounts_;
     std::deque<Bricks> bricks_;
     std::deque<TetMesh> boxes_;
     std::deque<Warm> warm_;
@@ -183,6 +190,8 @@ class Benchmark {
 
 void Benchmark::openMeshAndField() {
     if (request_.gradedElements > 0) {
+        if (!request_.field.empty())
+            throw InputError("--field: a graded box has one field only, which is taken");
         mesh_ = gradedBox(request_.gradedElements);
         meshName_ = "graded box";
         say(fmt::format("graded box: {} elements\n", formatCount(mesh_.elementCount())));
@@ -222,7 +231,10 @@ void Benchmark::add(BrickCase bricks, const std::string& ladder, bool isOfElemen
         if (kept.criterion == "element size") one.work = std::pow(kept.refine.samplesPerElement, 3);
     }
     // Without the coarsest lattice of the first algorithm there would be nothing to tell.
-    one.isKept = cases_.empty();
+    // Nor would a peer be in every plot.
+    const bool isPeersFirst = kept.variant->role == VariantRole::peer && kept.criterion == "uniform" &&
+                              ladderCounts_[one.ladder]++ < 2;
+    one.isKept = cases_.empty() || isPeersFirst;
     cases_.push_back(std::move(one));
 }
 
@@ -380,10 +392,14 @@ Json Benchmark::oracleJson() {
         job_.execution.report(Stage::checking, std::int64_t(all.size()), std::int64_t(list_.variants.size()));
         leaveOut(v.name + " isn't checked against exact arithmetic", [&] {
             OracleFigures figures = places->measure(*v.resampler, v.bind, quiet);
+            // What covers nothing has no error.
+            const auto figureOrNull = [&](double value) {
+                return figures.error.count > 0 ? Json(value) : Json(nullptr);
+            };
             variants.push_back({{"variant", v.name},
-                                {"max", figures.error.max},
-                                {"p999", figures.error.p999},
-                                {"rms", figures.error.rms},
+                                {"max", figureOrNull(figures.error.max)},
+                                {"p999", figureOrNull(figures.error.p999)},
+                                {"rms", figureOrNull(figures.error.rms)},
                                 {"places", figures.error.count},
                                 {"holes", figures.holes},
                                 {"spills", figures.spills}});
@@ -454,6 +470,7 @@ Json Benchmark::inputJson() const {
     double range = 0;
     for (int c = 0; c < field.components; ++c) range = std::max(range, fieldRange(field, c).width());
     return {{"mesh", meshName_},
+            {"file", request_.mesh.empty() ? Json(nullptr) : Json(request_.mesh)},
             {"nodes", mesh_.points.size()},
             {"elements", mesh_.elementCount()},
             {"field", field.name},
@@ -470,7 +487,7 @@ Json Benchmark::run() {
     openMeshAndField();
     const int threads = job_.execution.threadCount();
     if (earlier) checkComparable(*earlier, {{"input", inputJson()}, {"machine", {{"threads", threads}}}});
-    list_ = listVariants(request_, threads);
+    list_ = listVariants(request_, job_.execution);
     absent_ = list_.absent;
     Json parts = Json::object();  // where the time goes
     Timer part;
@@ -491,7 +508,7 @@ Json Benchmark::run() {
                                   .longestMs = 1e3 * extent_.seconds},
                                  job_.execution, [this](const std::string& text) { say(text); });
     for (const TimedCase& one : cases_)
-        if (!one.leftOut.empty()) absent_.push_back(one.leftOut);
+        if (!one.leftOut.empty() && !one.isFollower) absent_.push_back(one.leftOut);
     parts["rounds"] = part.restart() / 1000;
     addPictures();
     parts["pictures"] = part.restart() / 1000;
@@ -521,23 +538,26 @@ Json Benchmark::run() {
         rooflineJson(document["runs"], document["variants"], meshBytes, mesh_.fields[0].components, rates);
     document["warm"] = warmJsons();
     document["paper"] = paperJson();
-    document["yardstick"] = intervalJson(cases_.back().interval());
+    document["yardstick"] = cases_.back().isTimed() ? intervalJson(cases_.back().interval()) : Json(nullptr);
     document["absent"] = absent_;
-    document["advice"] = adviceOn(document, meshName_);
+    document["advice"] = adviceOn(document);
     if (earlier) document["compared"] = compareBenchmarks(*earlier, document);
     document["settings"] = {{"quick", request_.isQuick},           {"rounds", rounds},
                             {"seconds", timer.elapsedMs() / 1000}, {"seconds_of_parts", std::move(parts)},
                             {"resolutions", extent_.resolutions},  {"seed", request_.seed}};
 
-    say(benchmarkText(document, job_.textWidth));
-    std::filesystem::create_directories(folder / "plots");
+    writeFile(folder / "report.json", documentText(document));  // all else can be made of it
     writeFile(folder / "oracle.csv", oracleCsv_);
     writeFile(folder / "runs.csv", csvOf(document["runs"]));
-    writeFile(folder / "report.json", documentText(document));
     for (const PlotFile& plot : benchmarkPlots(document))
         writeFile(folder / "plots" / (plot.name + ".svg"), plot.svg);
-    writeFile(folder / "index.html", benchmarkPage(document));
-    say(fmt::format("wrote {}\n", (folder / "index.html").string()));
+    const std::string page = benchmarkPage(document);
+    if (page.size() > kMostPageBytes)
+        job_.warn(fmt::format("the page has {}: with fewer --points it is quicker to open",
+                              formatBytes(std::int64_t(page.size()))));
+    writeFile(folder / "index.html", page);
+    say(benchmarkText(document, job_.textWidth) +
+        fmt::format("wrote {}\n", (folder / "index.html").string()));
     return document;
 }
 
@@ -551,6 +571,7 @@ class ReportFolder {
              !path.empty() && !std::filesystem::exists(path, error) && path != path.parent_path();
              path = path.parent_path())
             made_.push_back(path);
+        made_.insert(made_.begin(), std::filesystem::path(name) / "plots");
         std::filesystem::create_directories(name, error);
         if (error || !std::filesystem::is_directory(name))
             throw IoError(fmt::format("{}: the folder can't be made: {}", name,
@@ -573,8 +594,13 @@ void checkOutputs(const BenchmarkRequest& request, const Job& job) {
         outputs.push_back({"--output", (std::filesystem::path(request.folder) / name).string()});
         checkWritable(outputs.back().path);
     }
+    // One that can be entered and written to.
+    std::error_code error;
+    std::filesystem::create_directory(std::filesystem::path(request.folder) / "plots", error);
+    checkWritable((std::filesystem::path(request.folder) / "plots" / "noise.svg").string());
     std::vector<std::string> inputs;
-    if (!request.mesh.empty()) inputs.push_back(request.mesh);
+    for (const std::string& input : {request.mesh, request.comparedWith})
+        if (!input.empty()) inputs.push_back(input);
     checkOutputPaths(inputs, outputs);
 }
 

@@ -73,11 +73,11 @@ constexpr int kMostRepeats = 15;
 
 /// Of a sample, milliseconds.
 double costOf(const TimedCase& one, const RoundOptions& options) {
-    return std::max(one.firstMs, std::min(options.sampleMs, kMostRepeats * one.firstMs));
+    return std::max(one.first.wallMs, std::min(options.sampleMs, kMostRepeats * one.first.wallMs));
 }
 
 CaseSample sampleOf(const TimedCase& one, double sampleMs, const Execution& execution) {
-    const double fit = one.firstMs > 0 ? sampleMs / one.firstMs : kMostRepeats;
+    const double fit = one.first.wallMs > 0 ? sampleMs / one.first.wallMs : kMostRepeats;
     const int repeats = std::clamp(int(fit), 1, kMostRepeats) | 1;
     std::vector<CaseSample> samples;
     for (int r = 0; r < repeats; ++r) samples.push_back(one.run(execution));
@@ -98,29 +98,36 @@ std::string leftOutBecause(const TimedCase& one, const std::string& why) {
     return why.empty() ? why : fmt::format("{}: {}", one.what, why);
 }
 
+/// Ends work that takes far too long. @param what takes it: "a run".
+void withinPatience(const char* what, const RoundOptions& options, const Execution& execution,
+                    const std::function<void(const Execution&)>& work) {
+    const double limitMs = kPatience * options.longestRunMs;
+    const TimeLimit limit(execution, limitMs);
+    try {
+        work(limit.execution());
+    } catch (const Cancelled&) {
+        execution.throwIfCancelled();
+        throw InputError(fmt::format("{} takes more than {:g} s", what, limitMs / 1000));
+    }
+}
+
 void runFirst(TimedCase& one, Rung& rung, const RoundOptions& options, const Execution& execution) {
     const double expected =
         rung.work > 0 ? rung.ms * std::pow(std::max(1.0, one.work / rung.work), kGrowth) : 0;
-    if (rung.isLeftOut || expected > options.longestRunMs) {
-        one.leftOut =
-            fmt::format("{}: a run would take more than {:g} s", one.what, options.longestRunMs / 1000);
-        return;
-    }
     const std::string why = whyItFailed([&] {
-        const TimeLimit limit(execution, kPatience * options.longestRunMs);
-        try {
-            if (one.prepare) one.prepare(limit.execution());
-            one.firstMs = one.run(limit.execution()).ms;
-        } catch (const Cancelled&) {
-            execution.throwIfCancelled();
-            throw InputError(
-                fmt::format("a run takes more than {:g} s", kPatience * options.longestRunMs / 1000));
-        }
-        if (one.firstMs > options.longestRunMs)
-            throw InputError(fmt::format("a run takes {:.3g} s", one.firstMs / 1000));
+        if (rung.isLeftOut) throw InputError("left out as the one before it");
+        if (!one.isKept && expected > options.longestRunMs)
+            throw InputError(fmt::format("a run would take about {:.2g} s", expected / 1000));
+        if (one.prepare)
+            withinPatience("a run with all that is found out once", options, execution, one.prepare);
+        withinPatience("a run", options, execution,
+                       [&](const Execution& inner) { one.first = one.run(inner); });
+        if (!one.isKept && one.first.wallMs > options.longestRunMs)
+            throw InputError(fmt::format("a run takes {:.3g} s", one.first.wallMs / 1000));
     });
     one.leftOut = leftOutBecause(one, why);
-    rung = {one.firstMs, one.work, !one.leftOut.empty()};
+    one.isFollower = rung.isLeftOut;
+    rung = {one.first.wallMs, one.work, !one.leftOut.empty()};
 }
 
 }  // namespace
@@ -154,16 +161,18 @@ int runRounds(std::span<TimedCase> cases, const RoundOptions& options, const Exe
     // First runs are slower than later ones, so there is time for what is left.
     const int fewest = std::min(options.rounds, kFewestRounds);
     std::stable_sort(timedOnes.begin(), timedOnes.end(), [](const TimedCase* a, const TimedCase* b) {
-        return a->isKept != b->isKept ? a->isKept : a->firstMs < b->firstMs;
+        return a->isKept != b->isKept ? a->isKept : a->first.wallMs < b->first.wallMs;
     });
     while (!timedOnes.empty() && !timedOnes.back()->isKept && fewest * roundMs > options.longestMs) {
         TimedCase& longest = *timedOnes.back();
-        longest.leftOut = fmt::format("{}: a run takes {:.2g} s, too long for {} rounds in {:g} s",
-                                      longest.what, longest.firstMs / 1000, fewest, options.longestMs / 1000);
+        longest.leftOut =
+            fmt::format("{}: a run takes {:.2g} s, too long for {} rounds in {:g} s", longest.what,
+                        longest.first.wallMs / 1000, fewest, options.longestMs / 1000);
         roundMs -= costOf(longest, options);
         timedOnes.pop_back();
     }
     if (timedOnes.empty()) return 0;
+    std::sort(timedOnes.begin(), timedOnes.end());  // as they came: orders follow from the seed alone
     const int rounds = std::clamp(int(options.longestMs / roundMs), fewest, options.rounds);
     say(fmt::format("{} cases in {} rounds of about {:.2g} s\n", timedOnes.size(), rounds, roundMs / 1000));
     std::mt19937_64 random(options.seed);
@@ -213,7 +222,7 @@ CaseSample timed(const std::function<ResampleStatistics()>& work) {
     const double before = processorMs();
     const Timer timer;
     sample.statistics = work();
-    sample.ms = timer.elapsedMs();
+    sample.ms = sample.wallMs = timer.elapsedMs();
     sample.processorMs = processorMs() - before;
     return sample;
 }

@@ -16,6 +16,7 @@ namespace tessera {
 /// What one run of a case took.
 struct CaseSample {
     double ms = 0;           ///< what is compared
+    double wallMs = 0;       ///< what the run took all in all: for plans of how long others will
     double processorMs = 0;  ///< of all threads of this process
     std::vector<std::pair<std::string_view, double>> stagesMs;
     ResampleStatistics statistics;
@@ -29,11 +30,12 @@ struct TimedCase {
     /// Once, before all else: finds out what isn't timed. Takes about as long as a run. May be null.
     std::function<void(const Execution&)> prepare;
     std::function<CaseSample(const Execution&)> run;
-    bool isKept = false;  ///< not left out for want of time
+    bool isKept = false;  ///< not left out for want of time, only where it fails or takes far too long
 
     std::vector<CaseSample> samples;  ///< of the rounds
-    double firstMs = 0;               ///< of the run before them, shaders and caches cold
+    CaseSample first;                 ///< of the run before them, shaders and caches cold
     std::string leftOut;              ///< why it isn't timed, a sentence
+    bool isFollower = false;  ///< left out as the one before it on its ladder: there is no more to say
 
     bool isTimed() const { return !samples.empty(); }
     MedianInterval interval() const;

@@ -15,7 +15,7 @@ namespace tessera {
 namespace {
 
 // What sampling costs, in nanoseconds of the software resampler: the elements near a brick are scanned once
-// for the children on each side, and a call has work of its own. bench/brick_cost measures them.
+// for the children on each side, and a call has work of its own. `tessera bench` measures the like.
 constexpr double kCostElement = 450;
 constexpr double kCostPoint = 8;
 constexpr double kCostSplit = 50'000;
