@@ -75,7 +75,17 @@ Json reachJson(const std::vector<Rung>& ladder, double bound, bool isLargest) {
     // Errors needn't fall with every step: the first from which on all are within the bound.
     std::size_t first = ladder.size();
     while (first > 0 && ladder[first - 1].error <= bound) --first;
-    if (first == ladder.size()) return noneJson("not reached");
+    if (first == ladder.size()) {
+        // Refinement by error gets to any bound that it is asked for: a finer one wasn't tried.
+        const bool isByError = std::any_of(ladder.begin(), ladder.end(),
+                                           [](const Rung& rung) { return (*rung.run)["bound"].is_number(); });
+        return noneJson(isByError && std::none_of(ladder.begin(), ladder.end(),
+                                                  [&](const Rung& rung) {
+                                                      return numberOr((*rung.run)["bound"], 0) <= bound;
+                                                  })
+                            ? "not tried"
+                            : "not reached");
+    }
     if (first == 0) return measuredJson(*ladder[0].run, "coarsest tried");
     const Rung &coarse = ladder[first - 1], &fine = ladder[first];
     const double share = fine.error > 0 ? (std::log(coarse.error) - std::log(bound)) /

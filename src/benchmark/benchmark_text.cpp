@@ -42,7 +42,8 @@ std::string equalErrorText(const Json& document, std::size_t width) {
             if (at == rows.size()) rows.push_back({variant, criterion, kNone, kNone, kNone, kNone});
             const double bound = entry["bound"];
             const std::size_t column = bound == 0.1 ? 2 : bound == 0.05 ? 3 : bound == 0.02 ? 4 : 5;
-            rows[at][column] = entry["ms"].is_object() ? msText(entry["ms"]["median"]) : "not reached";
+            rows[at][column] =
+                entry["ms"].is_object() ? msText(entry["ms"]["median"]) : entry["how"].get<std::string>();
         }
         if (rows.size() > 1) text += formatTable(rows, width, {.keys = 2}) + "\n";
     }

@@ -70,7 +70,7 @@ DotRow equalErrorRow(const PageVariant& variant, const std::vector<EqualError>& 
     for (const EqualError& e : all) {
         if (e.variant != &variant || e.measure != measure || e.bound != bound) continue;
         if (!e.time) {
-            if (row.marks.empty()) row.note = kNotReached;
+            if (row.marks.empty()) row.note = e.how == kNotTried ? "not tried by error" : kNotReached;
             continue;
         }
         const bool isUniform = e.criterion == "uniform";
@@ -121,7 +121,7 @@ PageTable equalErrorTable(const PageSource& source, const std::vector<EqualError
                     if (e.variant == &variant && e.measure == measure && e.criterion == criterion &&
                         e.bound == bound)
                         row.back() =
-                            !e.time ? std::string(kNotReached)
+                            !e.time ? (e.how == kNotTried ? e.how : std::string(kNotReached))
                                     : (e.how == "coarsest tried" ? "\u2264 " : "") + timeText(e.time->median),
                         isKnown = true;
             }

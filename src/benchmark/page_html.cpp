@@ -85,9 +85,10 @@ bool hasNumbers(const std::vector<std::string>& row, const std::vector<TableColu
 std::string rowHtml(const std::vector<std::string>& row, const std::vector<TableColumn>& columns) {
     std::string html = "<tr>";
     for (std::size_t i = 0; i < row.size() && i < columns.size(); ++i)
-        html +=
-            fmt::format("<td{}>{}</td>", row[i] == kNotReached ? " class=\"none\"" : classOf(columns[i].kind),
-                        row[i].empty() ? "&ndash;" : inHtml(row[i]));
+        html += fmt::format(
+            "<td{}>{}</td>",
+            row[i] == kNotReached || row[i] == kNotTried ? " class=\"none\"" : classOf(columns[i].kind),
+            row[i].empty() ? "&ndash;" : inHtml(row[i]));
     return html + "</tr>\n";
 }
 

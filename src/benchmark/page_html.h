@@ -18,6 +18,8 @@ struct TableColumn {
 
 /// A cell that says that there is no such time.
 inline constexpr std::string_view kNotReached = "not reached";
+/// The same for one that refinement by error wasn't asked for, as it takes too long.
+inline constexpr std::string_view kNotTried = "not tried";
 
 /// Cells are text, not yet safe for HTML; empty ones become dashes, and rows without a number are left out.
 struct PageTable {

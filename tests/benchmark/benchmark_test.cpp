@@ -108,6 +108,9 @@ TEST(EqualError, TakesRefinementByTheLargestErrorForNothingElse) {
     // The RMS of each is a tenth: the first one is close enough for all but the last.
     EXPECT_EQ(entryOf(all, "rms", 0.02)["ms"]["median"], 10);
     EXPECT_EQ(entryOf(all, "rms", 0.01)["how"], "coarsest tried");
+    runs.erase(2);
+    runs.erase(2);
+    EXPECT_EQ(entryOf(equalErrorJson(runs), "max", 0.01)["how"], "not tried");
 }
 
 TEST(EqualError, DoesNotTrustALatticeWithALargerErrorBehindIt) {
