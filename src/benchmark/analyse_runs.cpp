@@ -201,12 +201,12 @@ std::string adviceForBound(const Json& document, double bound) {
     if (isUniform) {
         const double resolution = std::ceil(numberOr((*uniform)["resolution"], 0));
         const std::string how = fmt::format("--refine uniform --resolution {:.0f}", resolution);
-        std::string text =
-            fmt::format("For a largest error of {:g} %, {} of {:.0f} points is {}: {}{}.", 100 * bound,
-                        (*uniform)["how"] == "coarsest tried" ? "the coarsest lattice that was tried"
-                                                              : "a uniform lattice",
-                        resolution, (*uniform)["how"] == "coarsest tried" ? "enough" : "the quickest",
-                        costs(*uniform), commandFor(document, *uniform, how));
+        const std::string lattice =
+            (*uniform)["how"] == "coarsest tried"
+                ? fmt::format("the coarsest lattice that was tried, {:.0f} points, is enough", resolution)
+                : fmt::format("a uniform lattice of {:.0f} points is the quickest", resolution);
+        std::string text = fmt::format("For a largest error of {:g} %, {}: {}{}.", 100 * bound, lattice,
+                                       costs(*uniform), commandFor(document, *uniform, how));
         if (byError) text += fmt::format(" Bricks by error take {}.", costs(*byError));
         return text;
     }
