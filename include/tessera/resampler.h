@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -57,6 +58,10 @@ struct BindOptions {
     /// Bound on WorkMemory, bytes, without its fixed part; less than its least counts as that. 0: its most.
     /// Samples don't depend on it.
     std::int64_t workBytes = 0;
+    /// Of an algorithm that draws slice by slice (ResamplerInfo::isSliced): across which axis of the lattice,
+    /// 0 to 2; none: the one with the fewest pairs of element and slice. Samples don't depend on it, but
+    /// those of methods as they were published. Where they stay on a device it is 2.
+    std::optional<int> sliceAxis = std::nullopt;
 };
 
 /// What a resampler takes of this machine's memory while it samples, beside the mesh, what is found out about
@@ -105,6 +110,8 @@ struct ResamplerInfo {
     std::string description;
     /// Its targets are graphics devices or drivers, and its samples can stay there.
     bool isOnDevice = false;
+    /// It draws the lattice slice by slice.
+    bool isSliced = false;
     /// All targets give the same bits. Not so where each is a device of its own.
     bool targetsAgree = true;
     /// Whether it meets the contract in docs/algorithms.md: no holes, no spill, no overshoot, bounded error,

@@ -69,6 +69,11 @@ class Lister {
                 addIfBound(fmt::format("{}, {}", of.name, nameOf(format)), of, bind);
         }
         if (!info.isOnDevice) return;
+        for (int axis = 0; info.isSliced && axis < 3; ++axis) {
+            BindOptions along = of.bind;
+            along.sliceAxis = axis;
+            addIfBound(fmt::format("{}, along {}", of.name, "xyz"[axis]), of, along);
+        }
         BindOptions bind = of.bind;
         bind.primitives = Primitives::processor;
         addIfBound(of.name + ", processor", of, bind);
@@ -147,6 +152,7 @@ Json variantJson(const BenchmarkVariant& variant) {
             {"sample_format", nameOf(variant.bind.format)},
             {"threads", variant.threads},
             {"primitives", info.isOnDevice ? Json(nameOf(variant.bind.primitives)) : Json(nullptr)},
+            {"slice_axis", variant.bind.sliceAxis ? Json(*variant.bind.sliceAxis) : Json(nullptr)},
             {"role", nameOf(variant.role)},
             {"note", info.description}};
 }

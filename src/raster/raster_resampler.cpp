@@ -46,10 +46,14 @@ class BoundRaster : public BoundResampler {
           isPublished_(isPublished),
           isScan_(generator == nullptr),
           primitives_(options.primitives),
+          sliceAxis_(options.sliceAxis),
           workBytes_(options.workBytes),
           platform_(platform),
           target_(nameOf(platform)),
           generator_(std::move(generator)) {
+        if (sliceAxis_ && (isScan_ || *sliceAxis_ < 0 || *sliceAxis_ > 2))
+            throw InputError(isScan_ ? "it doesn't draw slices: there is no axis to choose"
+                                     : "the axis of slices is 0, 1 or 2");
         if (mesh.elementCount() >= std::int64_t(1) << 30)
             throw InputError("a mesh may have at most 2^30 - 1 elements");
         for (const int f : fields) {
@@ -179,6 +183,7 @@ class BoundRaster : public BoundResampler {
     bool isPublished_;
     bool isScan_;
     Primitives primitives_;
+    std::optional<int> sliceAxis_;
     std::int64_t workBytes_;
     GlPlatform platform_;
     std::string target_;
@@ -250,13 +255,15 @@ void BoundRaster::Run::plan() {
     axes_ = SliceAxes::along(2);
     if (deviceMesh_) {
         if (!slots_ && !bound_.isScan_)
-            axes_ = SliceAxes::along(
-                deviceMesh_->layerAxis({lattice_.uWorld.x, lattice_.vWorld.y, lattice_.wWorld.z}));
+            axes_ = SliceAxes::along(bound_.sliceAxis_.value_or(
+                deviceMesh_->layerAxis({lattice_.uWorld.x, lattice_.vWorld.y, lattice_.wWorld.z})));
         device_.thread().run(
             [&](GlContext& context) { device_.records().place(context, *deviceMesh_, lattice_); });
     } else {
         placeNodes();
-        if (!slots_ && !bound_.isScan_) axes_ = SliceAxes::along(chooseLayerAxis(mesh(), frame_, execution_));
+        if (!slots_ && !bound_.isScan_)
+            axes_ = SliceAxes::along(bound_.sliceAxis_ ? *bound_.sliceAxis_
+                                                       : chooseLayerAxis(mesh(), frame_, execution_));
         binRegions();
     }
     blocks_.resize(boxes_.size());
@@ -619,6 +626,7 @@ RasterResampler::RasterResampler(std::string name, std::string description, Meth
     : Resampler({.name = std::move(name),
                  .description = std::move(description),
                  .isOnDevice = true,
+                 .isSliced = method != Method::scan,
                  .targetsAgree = false,
                  .meetsContract = method != Method::published,
                  .formats = {SampleFormat::r32f, SampleFormat::r16f, SampleFormat::r16, SampleFormat::r8},

@@ -56,6 +56,37 @@ TEST_P(RasterRuns, SamplesDontDependOnTheMemoryForThem) {
     }
 }
 
+TEST_P(RasterRuns, SamplesDontDependOnTheAxisOfSlices) {
+    TetMesh mesh = boxMesh({.cells = Vec3i(9, 7, 5), .jitter = 0.25, .seed = 5});
+    addRandomField(mesh, "f", FieldLocation::point, 1, 0, 1, 7);
+    const std::vector<int> fields{0};
+    const IndexBox box{Vec3i(-2), Vec3i(40, 37, 31)};
+    const Lattice lattice = Lattice::axisParallel(Vec3d(-0.01), 1.0 / 33);
+    for (const std::string_view algorithm : {"slicing", "hybrid"})
+        for (const Primitives primitives : {Primitives::device, Primitives::processor}) {
+            BindOptions options = on(GetParam());
+            options.primitives = primitives;
+            const auto chosen = sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+            std::vector<std::int64_t> pairs;
+            for (int axis = 0; axis < 3; ++axis) {
+                options.sliceAxis = axis;
+                const auto along = sampleOnce(algorithm, mesh, fields, options, lattice, std::span(&box, 1));
+                ASSERT_EQ(along.blocks[0].coverage, chosen.blocks[0].coverage) << algorithm << axis;
+                ASSERT_EQ(along.blocks[0].values, chosen.blocks[0].values) << algorithm << axis;
+                pairs.push_back(along.statistics.count(counted::elementSlicePairs));
+            }
+            // It is another way of drawing, and the chosen one has the fewest pairs.
+            EXPECT_NE(pairs[0], pairs[2]);
+            EXPECT_EQ(chosen.statistics.count(counted::elementSlicePairs),
+                      *std::min_element(pairs.begin(), pairs.end()));
+        }
+    BindOptions options = on(GetParam());
+    options.sliceAxis = 3;
+    EXPECT_THROW(findResampler("slicing").bind(mesh, fields, options), InputError);
+    options.sliceAxis = 0;
+    EXPECT_THROW(findResampler("compute").bind(mesh, fields, options), InputError);
+}
+
 TEST_P(RasterRuns, AThousandLeakNeitherObjectsNorMemory) {
     const TetMesh mesh = smallMesh(2);
     const std::vector<int> one{0}, all{0, 1, 2};
