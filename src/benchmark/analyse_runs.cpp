@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <optional>
 
 #include "benchmark/median_interval.h"
+#include "benchmark/quoted_text.h"
 #include "job/report_text.h"
 #include "tessera/error.h"
 
@@ -137,17 +136,6 @@ Json fitJson(const std::string& variant, const Json& points) {
                         {"high", isBounded ? Json(fit.high) : Json(nullptr)}};
     json["factor_ms"] = fit.factor;
     return json;
-}
-
-/// A word for a shell.
-std::string shellWord(const std::string& word) {
-    const auto isPlain = [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) || std::strchr("_-./:+,@%", c);
-    };
-    if (!word.empty() && std::all_of(word.begin(), word.end(), isPlain)) return word;
-    std::string quoted = "'";
-    for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return quoted + "'";
 }
 
 std::string secondsText(double ms) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "benchmark/peer_resampler.h"
+#include "gl/gl_platform.h"
 #include "job/algorithm_list.h"
 #include "tessera/error.h"
 #include "tessera/registry.h"
@@ -139,6 +140,12 @@ std::string_view nameOf(VariantRole role) {
 
 VariantList listVariants(const BenchmarkRequest& request, const Execution& execution) {
     return Lister(request, execution).run();
+}
+
+GlThread& deviceOf(const BindOptions& bind) {
+    std::optional<GlPlatform> wanted;
+    if (!bind.target.empty()) wanted = parseGlPlatform(bind.target);
+    return sharedGlThread(chooseGlPlatform(wanted));
 }
 
 Json variantJson(const BenchmarkVariant& variant) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "benchmark/benchmark_request.h"
+#include "gl/gl_thread.h"
 #include "job/run_report.h"
 #include "tessera/resampler.h"
 
@@ -28,6 +29,13 @@ struct BenchmarkVariant {
     const Resampler* resampler = nullptr;
     BindOptions bind;
     int threads = 1;
+
+    /// With its own threads, and no progress.
+    Execution executionFrom(const Execution& given) const {
+        Execution own = given.withoutProgress();
+        own.threads = threads;
+        return own;
+    }
 };
 
 struct VariantList {
@@ -42,5 +50,8 @@ struct VariantList {
 VariantList listVariants(const BenchmarkRequest& request, const Execution& execution);
 
 Json variantJson(const BenchmarkVariant& variant);
+
+/// The device that options name, or the first one. Throws InputError and GlError.
+GlThread& deviceOf(const BindOptions& bind);
 
 }  // namespace tessera

@@ -33,12 +33,6 @@ int channelsOf(const TetMesh& mesh) {
     return mesh.fields[0].components;
 }
 
-Execution executionOf(const BrickCase& bricks, const Execution& execution) {
-    Execution own = execution.withoutProgress();
-    own.threads = bricks.variant->threads;
-    return own;
-}
-
 void addStatistics(const ResampleStatistics& statistics, CaseSample& sample) {
     sample.statistics = statistics;
     // Where something is drawn, sampling is made of the stages that are told apart.
@@ -184,12 +178,12 @@ TimedCase timedCase(BrickCase& bricks, const std::string& ladder) {
     one.what = fmt::format("{}, {}, {}", bricks.variant->name, bricks.criterion, bricks.asked);
     one.ladder = ladder;
     one.run = [&bricks](const Execution& execution) {
-        const Execution own = executionOf(bricks, execution);
+        const Execution own = bricks.variant->executionFrom(execution);
         return bricks.bound > 0 ? runByError(bricks, own) : runPlanned(bricks, own);
     };
     if (bricks.isErrorMeasured)
         one.prepare = [&bricks](const Execution& execution) {
-            findOut(bricks, executionOf(bricks, execution));
+            findOut(bricks, bricks.variant->executionFrom(execution));
         };
     return one;
 }

@@ -46,9 +46,7 @@ Json textOrNull(const std::string& text) {
 
 Json deviceJson(const BindOptions& bind) {
     try {
-        std::optional<GlPlatform> wanted;
-        if (!bind.target.empty()) wanted = parseGlPlatform(bind.target);
-        const GlDeviceInfo& info = sharedGlThread(chooseGlPlatform(wanted)).info();
+        const GlDeviceInfo& info = deviceOf(bind).info();
         return {{"renderer", info.renderer},
                 {"vendor", info.vendor},
                 {"version", info.version},

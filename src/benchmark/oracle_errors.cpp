@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "benchmark/quoted_text.h"
 #include "compare/sampling_grid.h"
 #include "mesh/field_range.h"
 #include "reference/oracle.h"
@@ -64,12 +65,6 @@ double largestRange(const Field& field) {
 }
 
 }  // namespace
-
-std::string csvText(const std::string& text) {
-    std::string quoted = "\"";
-    for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return quoted + '"';
-}
 
 ErrorFigures figuresOf(std::vector<double> errors) {
     ErrorFigures figures;

@@ -11,9 +11,6 @@
 
 namespace tessera {
 
-/// A text as a cell of a .csv file: in quotes.
-std::string csvText(const std::string& text);
-
 /// What a figure of errors is made of: shares of the field's range.
 struct ErrorFigures {
     double max = 0, p999 = 0, rms = 0;

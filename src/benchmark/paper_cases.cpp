@@ -84,8 +84,7 @@ std::vector<TimedCase> PaperCases::timedCases() {
             if (!bound) bound = variant.resampler->bind(set.mesh, fields, variant.bind);
         };
         timedOne.run = [&one, &variant, &bound](const Execution& execution) {
-            Execution own = execution.withoutProgress();
-            own.threads = variant.threads;
+            const Execution own = variant.executionFrom(execution);
             CaseSample sample = timed([&] {
                 return bound->resample(
                     one.lattice, one.boxes, [](std::size_t, const Block&) {}, own);

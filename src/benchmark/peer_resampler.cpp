@@ -16,6 +16,7 @@
 
 #include "base/parallel.h"
 #include "base/timer.h"
+#include "benchmark/quoted_text.h"
 #include "files/temporary_folder.h"
 #include "mesh_files/write_tets.h"
 #include "resample/check_lattice.h"
@@ -281,13 +282,6 @@ class PeerResampler : public Resampler {
     mutable std::mutex mutex_;
     mutable std::string failure_;
 };
-
-/// As one word of /bin/sh.
-std::string shellWord(const std::string& text) {
-    std::string word = "'";
-    for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return word + "'";
-}
 
 }  // namespace
 

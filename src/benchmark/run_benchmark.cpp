@@ -25,9 +25,9 @@
 #include "benchmark/paper_cases.h"
 #include "benchmark/picture_errors.h"
 #include "benchmark/program_memory.h"
+#include "benchmark/quoted_text.h"
 #include "benchmark/warm_cases.h"
 #include "files/atomic_file.h"
-#include "gl/gl_platform.h"
 #include "job/field_selection.h"
 #include "job/import_mesh.h"
 #include "job/output_paths.h"
@@ -280,12 +280,7 @@ GlThread* Benchmark::device() {
     const bool isWanted = std::any_of(list_.variants.begin(), list_.variants.end(), [&](const auto& v) {
         return isMain(v) && v.resampler->info().isOnDevice;
     });
-    if (isWanted)
-        leaveOut("No samples are left on a device", [&] {
-            std::optional<GlPlatform> wanted;
-            if (!request_.bind.target.empty()) wanted = parseGlPlatform(request_.bind.target);
-            device = &sharedGlThread(chooseGlPlatform(wanted));
-        });
+    if (isWanted) leaveOut("No samples are left on a device", [&] { device = &deviceOf(request_.bind); });
     return device;
 }
 

@@ -92,8 +92,7 @@ TimedCase timedCase(WarmCase& warm, const std::string& ladder) {
     for (const WarmCase::Part& part : warm.parts)
         for (const IndexBox& box : part.boxes) one.work += double(box.count());
     const auto run = [&warm](const Execution& execution) {
-        Execution own = execution.withoutProgress();
-        own.threads = warm.variant->threads;
+        const Execution own = warm.variant->executionFrom(execution);
         CaseSample sample = timed([&] {
             ResampleStatistics statistics;
             for (WarmCase::Part& part : warm.parts)
