@@ -20,12 +20,11 @@ double medianOf(const std::vector<Sample>& samples, Figure figure) {
     return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
 }
 
-/// Processor time of all threads of this process so far, those of an emulated OpenGL device included, in
-/// milliseconds; or of the calling thread, RUSAGE_THREAD. On a busy machine it is steadier than the wall
-/// clock.
-inline double processorMs(int who = RUSAGE_SELF) {
+/// Processor time of all threads of this process so far, in milliseconds. On a busy machine it is steadier
+/// than the wall clock.
+inline double processorMs() {
     rusage usage{};
-    getrusage(who, &usage);
+    getrusage(RUSAGE_SELF, &usage);
     const auto ms = [](const timeval& t) { return double(t.tv_sec) * 1e3 + double(t.tv_usec) * 1e-3; };
     return ms(usage.ru_utime) + ms(usage.ru_stime);
 }
