@@ -141,7 +141,7 @@ int main(int wordCount, char** words) {
     std::string path;
     int points = 256;
     tessera::bench::Arguments arguments("Counts what a resample asks of an OpenGL device.");
-    arguments.addNeeded("mesh", path, "e.g. that of make_graded_mesh.py");
+    arguments.addNeeded("mesh", path, "a .vtu file, e.g. what tessera-tetrahedralize makes of graded:150K");
     // More would be several regions.
     arguments.add("--points", points, "lattice points along an axis", {2, 256});
     return arguments.run(wordCount, words, [&] {

@@ -143,7 +143,8 @@ int main(int count, char** words) {
     Options options;
     tessera::bench::Arguments arguments(
         "Times reading a mesh in process against reading it in a process of its own.");
-    arguments.addNeeded("mesh", options.meshPath, "a .vtu file, e.g. that of make_graded_mesh.py");
+    arguments.addNeeded("mesh", options.meshPath,
+                        "a .vtu file, e.g. what tessera-tetrahedralize makes of graded:150K");
     arguments.add("--program", options.program, "the tessera program");
     arguments.add("--reader", options.reader,
                   "the program that the library starts; empty: the tessera program");

@@ -8,7 +8,7 @@ packages=(
   libglm-dev libgmp-dev libhwy-dev libcli11-dev nlohmann-json3-dev libfmt-dev libmimalloc-dev libseccomp-dev
   libgl-dev libegl-dev libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6
   libglfw3-dev libimgui-dev libstb-dev xvfb openbox xdotool
-  libgtest-dev libbenchmark-dev clang-format tetgen
+  libgtest-dev libbenchmark-dev clang-format libtet1.5-dev
   python3 python3-vtk9 python3-openvdb python3-numpy python3-jsonschema python3-xlib python3-pil
 )
 

@@ -20,7 +20,7 @@ if(TESSERA_BUILD_IO)
   tessera_test(cache_test FOLDER cache LINK cache software)
   tessera_test(nvdb_test FOLDER vdb LINK vdb PRIVATE_LINK tessera_nanovdb)
   # The fuzz targets over their stored inputs, by this compiler and without libFuzzer.
-  foreach(name fuzz_tetgen fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)
+  foreach(name fuzz_tetgen fuzz_surface fuzz_vdb_metadata fuzz_report_json fuzz_assemble_mesh fuzz_netcdf_check)
     tessera_program(replay_${name} SOURCES fuzz/replay.cpp fuzz/${name}.cpp LINK reader vdb)
     add_test(NAME replay_${name} COMMAND replay_${name} ${CMAKE_CURRENT_SOURCE_DIR}/fuzz/corpus/${name})
   endforeach()

@@ -87,12 +87,12 @@ def check_links(rows, problems):
 
 
 def check_heavy(problems):
-    """One room includes OpenVDB and one VTK, in few translation units; its headers that do are its own and the tests'."""
+    """One room includes OpenVDB, one VTK and one TetGen, in few translation units; its headers that do are its own and the tests'."""
     def includes(path, pattern):
         return re.search(r"^\s*#\s*include\s*[<\"]" + pattern, path.read_text(), re.M)
 
     paths = [p for folder in ("src", "apps", "tests") for p in source_files(ROOT / folder)]
-    for library, pattern, room in (("OpenVDB", r"(?:open|nano)vdb/", "vdb"), ("VTK", r"vtk\w+\.h", "mesh_files")):
+    for library, pattern, room in (("OpenVDB", r"(?:open|nano)vdb/", "vdb"), ("VTK", r"vtk\w+\.h", "mesh_files"), ("TetGen", r"tetgen\.h", "tetgen")):
         heavy = [p for p in source_files(ROOT / "src" / room) if p.suffix == ".h" and includes(p, pattern)]
         for header in heavy:  # those included by an earlier one count through it
             heavy += [p for p in source_files(ROOT / "src" / room) if p.suffix == ".h" and p not in heavy and includes(p, f"{room}/{header.name}")]

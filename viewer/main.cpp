@@ -10,6 +10,7 @@
 
 #include "base/text.h"
 #include "gl/gl_platform.h"
+#include "reader/isolated_tetrahedra.h"
 #include "tessera/error.h"
 #include "window.h"
 
@@ -88,6 +89,7 @@ int view(int argc, char** argv) {
     if (!program.empty()) {
         const std::string quick = quickReaderBeside(program);
         job.reader = {program, {"read-mesh"}, quick};
+        job.tetrahedralizer = tetrahedralizerBeside(program);
         tryGlFirst({quick.empty() ? program : quick, {kTryGlCommand}});
     }
     if (!gl.empty()) options.platform = parseGlPlatform(gl);

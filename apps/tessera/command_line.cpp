@@ -3,37 +3,20 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <limits>
 #include <memory>
-#include <sstream>
 
 #include "commands.h"
 #include "job/program_presets.h"
-#include "job/wrap_text.h"
+#include "option_groups.h"
 #include "resample/cut_plane.h"
-#include "terminal.h"
 #include "tessera/error.h"
 
 namespace tessera {
 
 namespace {
 
-constexpr std::size_t kHelpColumn = 34;  // where descriptions begin
 constexpr double kLeastLength = 1e-300, kLargestLength = 1e300;
-
-/// Numbers from `first` to `last`; says so in plain figures.
-CLI::Validator numbersWithin(double first, double last) {
-    const auto check = [first, last](std::string& text) {
-        double value = 0;
-        const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool isNumber = failure == std::errc{} && end == text.data() + text.size();
-        return isNumber && value >= first && value <= last
-                   ? std::string()
-                   : fmt::format("expected {:g} to {:g}, got '{}'", first, last, text);
-    };
-    return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
-}
 
 CLI::Option* addTimeStep(CLI::App& command, int& step) {
     return command
@@ -106,14 +89,7 @@ void addReaderOptions(CLI::App& command, ReaderArguments& a) {
 }
 
 void addCommonOptions(CLI::App& command, CommonOptions& options, bool readsMesh = true) {
-    command
-        .add_option("--threads", options.threads,
-                    "worker threads (default: one for every processor); the result never depends on it")
-        ->check(CLI::Range(0, 1024));
-    command.add_flag("-q,--quiet", options.quiet,
-                     "print nothing but errors, and a warning where a result isn't what was asked for");
-    command.add_option("--json", options.jsonPath,
-                       "write a report as JSON to this file, or to standard output for -");
+    addRunOptions(command, options);
     command
         .add_option("--max-driver-time", options.maxDriverSeconds,
                     "seconds in which OpenGL's drivers must show that they work")
@@ -688,11 +664,8 @@ void addView(CLI::App& app, CommandLine& line) {
 }
 
 void describe(CLI::App& app, CommandLine& line) {
-    app.name("tessera");
-    app.set_version_flag("--version", fmt::format("tessera {}", TESSERA_VERSION));
-    app.set_help_flag("-h,--help", "print this help and exit");
+    nameProgram(app, "tessera", fmt::format("tessera {}", TESSERA_VERSION));
     app.require_subcommand(1);
-    app.get_formatter()->column_width(kHelpColumn);
     app.footer(
         "Example:\n  tessera resample flow.vtu -o flow.vdb\n'tessera <command> --help' tells more. Exit "
         "codes: 0 done, "
@@ -721,20 +694,6 @@ void describe(CLI::App& app, CommandLine& line) {
                addFocusTraceOptions, runFocusTrace);
 }
 
-/// Lines that a terminal would break anywhere, broken between words. Descriptions stay in their column.
-std::string wrapHelp(const std::string& text) {
-    std::istringstream lines(text);
-    std::string wrapped;
-    const auto width = std::size_t(outputWidth());
-    for (std::string line; std::getline(lines, line);) {
-        const bool isOption = line.size() > kHelpColumn && line.starts_with(' ') &&
-                              line[kHelpColumn - 1] == ' ' && line[kHelpColumn] != ' ';
-        const std::size_t indent = std::min(line.find_first_not_of(' '), line.size());
-        wrapped += wrapLine(line, width, isOption ? kHelpColumn : indent) + "\n";
-    }
-    return wrapped;
-}
-
 }  // namespace
 
 CommandLine parseCommandLine(int argc, char** argv) {
@@ -744,15 +703,7 @@ CommandLine parseCommandLine(int argc, char** argv) {
     const auto isFirstWord = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
     if (argc > 1 && argv[1][0] != '-' && app.get_subcommands(isFirstWord).empty())
         throw InputError(fmt::format("there is no command '{}' (tessera --help lists them)", argv[1]));
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() != 0)
-            throw InputError(fmt::format("{} (tessera --help tells more)", error.what()));
-        std::ostringstream text;
-        app.exit(error, text);
-        line.text = wrapHelp(text.str());
-    }
+    parseWords(app, argc, argv, line);
     return line;
 }
 

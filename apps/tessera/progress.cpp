@@ -30,6 +30,8 @@ const char* wordsOf(Stage stage) {
     switch (stage) {
         case Stage::reading:
             return "reading the mesh";
+        case Stage::tetrahedralizing:
+            return "making tetrahedra";
         case Stage::repairing:
             return "repairing the mesh";
         case Stage::planning:

@@ -15,6 +15,8 @@
 #include "gl/gl_platform.h"
 #include "interrupt.h"
 #include "job/wrap_text.h"
+#include "reader/isolated_tetrahedra.h"
+#include "run_program.h"
 #include "terminal.h"
 #include "tessera/error.h"
 
@@ -36,7 +38,7 @@ void checkReaderOptions(const ReaderArguments& reader) {
 }
 
 void printWarning(const std::string& text) {
-    std::string line = fmt::format("tessera: warning: {}\n", singleLine(text));
+    std::string line = fmt::format("{}: warning: {}\n", programName(), singleLine(text));
     if (::isatty(STDERR_FILENO) == 1) line = wrapLines(line, std::size_t(terminalWidth(STDERR_FILENO)));
     const auto pause = pauseProgress();
     std::fputs(line.c_str(), stderr);
@@ -74,6 +76,7 @@ Session::Session(const CommonOptions& options, const std::string& output)
     checkReaderOptions(reader);
     job.followsLinks = reader.followsLinks;
     if (reader.kind == "isolated") job.reader = {program, {kReadMeshCommand}, quick};
+    job.tetrahedralizer = tetrahedralizerBeside(program);
     if (!reader.maxMemory.empty())
         job.readerLimits.memoryBytes = parseCount("--max-memory", reader.maxMemory, true);
     tryGlFirst({quick.empty() ? program : quick,

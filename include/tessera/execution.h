@@ -11,6 +11,8 @@ namespace tessera {
 /// What a run is at.
 enum class Stage : std::uint8_t {
     reading,
+    /// Making tetrahedra of a surface or of points.
+    tetrahedralizing,
     repairing,
     planning,
     sampling,

@@ -26,7 +26,8 @@ float fractionIn(std::uint64_t latest) {
 
 /// Stages whose work doesn't say how it goes on.
 bool isSilent(Stage stage) {
-    return stage == Stage::reading || stage == Stage::extending || stage == Stage::writing;
+    return stage == Stage::reading || stage == Stage::tetrahedralizing || stage == Stage::extending ||
+           stage == Stage::writing;
 }
 
 }  // namespace
@@ -120,7 +121,8 @@ double RunProgress::unitsAfter(std::size_t position) const {
 
 /// Whether the time it takes tells how long the stages behind it will.
 bool RunProgress::isCounted(Stage stage) const {
-    return stage != Stage::reading && stage != Stage::repairing && stage != Stage::planning;
+    return stage != Stage::reading && stage != Stage::tetrahedralizing && stage != Stage::repairing &&
+           stage != Stage::planning;
 }
 
 /// The stage at work is over.

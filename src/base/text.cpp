@@ -79,6 +79,13 @@ std::string messageLine(std::string_view text) {
     return line.substr(0, front) + "..." + line.substr(back);
 }
 
+std::string lowerCase(std::string_view text) {
+    std::string lower(text);
+    for (char& c : lower)
+        if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+    return lower;
+}
+
 std::string plainName(std::string name) {
     for (char& c : name)
         if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';

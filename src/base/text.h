@@ -28,6 +28,8 @@ std::string singleLine(std::string_view text);
 std::string messageLine(std::string_view text);
 /// With what a program puts before it a line of 1000 bytes.
 inline constexpr std::size_t kLongestMessageBytes = 980;
+/// Small letters in place of the capital ones of ASCII.
+std::string lowerCase(std::string_view text);
 /// A name that a file gives something: control characters of ASCII become spaces, all else stays.
 std::string plainName(std::string name);
 

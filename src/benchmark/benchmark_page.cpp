@@ -10,7 +10,7 @@
 #include "benchmark/page_html.h"
 #include "benchmark/page_numbers.h"
 #include "benchmark/page_times.h"
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 namespace tessera {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 namespace tessera {
 

@@ -9,7 +9,7 @@
 #include "benchmark/page_accuracy.h"
 #include "benchmark/page_html.h"
 #include "benchmark/page_numbers.h"
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 namespace tessera {
 

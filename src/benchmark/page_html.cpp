@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 namespace tessera {
 

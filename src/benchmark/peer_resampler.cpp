@@ -125,7 +125,7 @@ class BoundPeer : public BoundResampler {
         for (const Field& field : chosen.fields) components_.push_back(field.components);
         for (const int components : components_) channels_ += components;
         const std::string meshPath = folder_.pathOf("mesh.vtu");
-        writeTets(chosen, meshPath);
+        writeTets(chosen, meshPath, {});
         process_.emplace(peer, meshPath, folder_.pathOf("stderr.txt"));
         name_ = peer.name;
     }

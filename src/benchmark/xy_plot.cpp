@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "benchmark/page_numbers.h"
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 namespace tessera {
 

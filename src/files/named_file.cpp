@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "base/text.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -17,6 +18,10 @@ void checkInFolder(const std::string& folder, const std::string& by, const std::
         return;
     throw InputError(by + ": names " + named + ", which lies outside the folder " + folder +
                      kFollowLinksHint);
+}
+
+std::string extensionOf(const std::string& path) {
+    return lowerCase(std::filesystem::path(path).extension().string());
 }
 
 std::string folderOf(const std::string& path) {

@@ -23,7 +23,7 @@ TetsResult exportTets(const TetsRequest& request, Job& job) {
     result.times.readMs = timer.restart();
     job.execution.throwIfCancelled();
     job.execution.report(Stage::writing, 0, 1);
-    writeTets(mesh, request.output);
+    writeTets(mesh, request.output, job.execution);
     result.times.writeMs = timer.elapsedMs();
     job.say(importText(request.input, result.mesh.statistics, result.mesh.boundsWorld));
     tellRepair(request.input, result.mesh, job);

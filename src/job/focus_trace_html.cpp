@@ -8,8 +8,8 @@
 #include <optional>
 #include <string_view>
 
+#include "files/html_text.h"
 #include "job/focus_trace_text.h"
-#include "job/html_text.h"
 #include "job/report_text.h"
 
 namespace tessera {

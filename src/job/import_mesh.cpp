@@ -8,6 +8,9 @@
 
 #include "base/timer.h"
 #include "job/series_steps.h"
+#include "job/tetrahedralize_file.h"
+#include "mesh_files/read_surface.h"
+#include "reader/isolated_tetrahedra.h"
 #include "refine/plan_frame.h"
 #include "tessera/error.h"
 
@@ -23,6 +26,10 @@ MeshFile openMesh(const std::string& path, const ReadOptions& given, Job& job) {
     if (isCollectionName(path)) {
         const SeriesStep step = chosenStep(path, options.timeStep);
         return openMesh(step.files[0], readOptions(step, options.fields, -1), job);
+    }
+    if (isSurfaceName(path)) {
+        job.say(fmt::format("{}: holds no cells; {} makes tetrahedra of it\n", path, kTetrahedralizer));
+        return makeTetrahedra(path, options, {}, job);
     }
     std::error_code error;
     const auto bytes = std::filesystem::file_size(path, error);

@@ -19,7 +19,9 @@ struct Job {
     using Listener = std::function<void(const std::string&)>;
 
     Execution execution;
-    std::optional<IsolatedReader> reader;       ///< reads meshes in a separate process; none: this one reads
+    std::optional<IsolatedReader> reader;  ///< reads meshes in a separate process; none: this one reads
+    /// Makes tetrahedra of surfaces and points; none: it isn't installed.
+    std::optional<IsolatedReader> tetrahedralizer;
     IsolationLimits readerLimits;               ///< of that process
     bool followsLinks = false;                  ///< meshes may name files outside their folder
     std::size_t textWidth = kUsualTextWidth;    ///< columns that tables keep to

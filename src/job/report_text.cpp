@@ -88,6 +88,7 @@ std::string importText(const std::string& path, const ImportStatistics& s, const
         text += fmt::format("  {} elements have the other orientation, which changes nothing\n",
                             formatCount(s.inverted));
     if (s.elements > 0 && s.flat == s.elements) text += "  nothing to sample: every element is flat\n";
+    for (const std::string& note : s.notes) text += fmt::format("  {}\n", note);
     for (const std::string& warning : s.warnings) text += fmt::format("  warning: {}\n", warning);
     return text;
 }

@@ -85,27 +85,29 @@ Json fieldsJson(const std::vector<FieldSummary>& fields) {
 }
 
 Json meshJson(const ImportStatistics& s, const Box3d& bounds, const std::vector<FieldSummary>& fields) {
-    return {{"format", s.format},
-            {"nodes", s.nodes},
-            {"elements", s.elements},
-            {"cells", s.cells},
-            {"cell_types", cellTypesJson(s)},
-            {"skipped_cells", s.skippedCells},
-            {"blanked_cells", s.blankedCells},
-            {"higher_order_cells", s.higherOrderCells},
-            {"blocks", s.blocks},
-            {"added_nodes", s.addedNodes},
-            {"flat_elements", s.flat},
-            {"inverted_elements", s.inverted},
-            {"duplicate_elements", s.duplicate},
-            {"coincident_nodes", s.coincidentNodes},
-            {"boundary_faces", s.boundaryFaces},
-            {"non_conforming_faces", s.nonConformingFaces},
-            {"edge_range", {s.smallestEdgeWorld, s.largestEdgeWorld}},
-            {"volume_range", {s.smallestVolumeWorld, s.largestVolumeWorld}},
-            {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}},
-            {"fields", fieldsJson(fields)},
-            {"warnings", s.warnings}};
+    Json json{{"format", s.format},
+              {"nodes", s.nodes},
+              {"elements", s.elements},
+              {"cells", s.cells},
+              {"cell_types", cellTypesJson(s)},
+              {"skipped_cells", s.skippedCells},
+              {"blanked_cells", s.blankedCells},
+              {"higher_order_cells", s.higherOrderCells},
+              {"blocks", s.blocks},
+              {"added_nodes", s.addedNodes},
+              {"flat_elements", s.flat},
+              {"inverted_elements", s.inverted},
+              {"duplicate_elements", s.duplicate},
+              {"coincident_nodes", s.coincidentNodes},
+              {"boundary_faces", s.boundaryFaces},
+              {"non_conforming_faces", s.nonConformingFaces},
+              {"edge_range", {s.smallestEdgeWorld, s.largestEdgeWorld}},
+              {"volume_range", {s.smallestVolumeWorld, s.largestVolumeWorld}},
+              {"bounds", {vectorJson(bounds.min), vectorJson(bounds.max)}},
+              {"fields", fieldsJson(fields)},
+              {"warnings", s.warnings}};
+    if (!s.notes.empty()) json["notes"] = s.notes;
+    return json;
 }
 
 Json levelsJson(const BrickTree& tree, const std::vector<LevelSummary>& levels) {

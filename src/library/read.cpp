@@ -4,7 +4,9 @@
 
 #include "library/program.h"
 #include "mesh_files/mesh_series.h"
+#include "mesh_files/read_surface.h"
 #include "reader/isolated_reader.h"
+#include "reader/isolated_tetrahedra.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -21,6 +23,11 @@ IsolatedReader findReader(const std::string& given) {
     return {program, {"read-mesh"}, quickReaderBeside(program)};
 }
 
+InputMesh inputOf(MeshFile file, const std::string& path) {
+    return {std::move(file.mesh), std::filesystem::path(path).filename().string(), std::nullopt,
+            std::move(file.statistics.warnings)};
+}
+
 InputMesh readFiles(const std::vector<std::string>& files, const std::string& collection, int step,
                     const InputOptions& options, const Execution& execution) {
     if (files.empty()) throw InputError("a step without a file can't be read");
@@ -32,11 +39,17 @@ InputMesh readFiles(const std::vector<std::string>& files, const std::string& co
     limits.seconds = options.maxSeconds;
     if (limits.memoryBytes < 0 || !(limits.seconds >= 0))
         throw InputError("bounds on the reading of a mesh must not be negative");
+    if (isSurfaceName(files[0])) {
+        const std::string program = options.program.empty() ? findProgram() : options.program;
+        const std::optional<IsolatedReader> found = tetrahedralizerBeside(program);
+        MeshFile made = tetrahedralizeIsolated(requireTetrahedralizer(found, files[0]), files[0], read, {},
+                                               limits, execution);
+        return inputOf(std::move(made), files[0]);
+    }
     MeshFile file = options.isIsolated
                         ? readMeshIsolated(findReader(options.program), files[0], read, limits, execution)
                         : readMesh(files[0], read, execution);
-    return {std::move(file.mesh), std::filesystem::path(files[0]).filename().string(), std::nullopt,
-            std::move(file.statistics.warnings)};
+    return inputOf(std::move(file), files[0]);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "mesh/box_tree.h"
 #include "mesh/field_range.h"
 #include "mesh/geometry.h"
+#include "mesh/triangle_distance.h"
 
 namespace tessera {
 
@@ -24,11 +25,6 @@ double larger(double a, double b) {
     return a > b ? a : b;
 }
 
-struct Candidate {
-    double distance2 = std::numeric_limits<double>::infinity();
-    std::array<double, 3> weights{};
-};
-
 /// A face with its nodes in ascending order: the distance to an edge comes out the same, bit for bit, from
 /// both its faces.
 struct BoundaryTriangle {
@@ -36,52 +32,6 @@ struct BoundaryTriangle {
     std::array<std::int32_t, 3> nodes;
     std::int32_t element;
 };
-
-/// Nearest place on the edge i-j, which may have no length.
-void offerEdge(const BoundaryTriangle& triangle, std::size_t i, std::size_t j, const Vec3d& point,
-               Candidate& best) {
-    const Vec3d edge = triangle.corners[j] - triangle.corners[i];
-    const Vec3d toPoint = point - triangle.corners[i];
-    const double length2 = glm::dot(edge, edge);
-    const double along = glm::dot(toPoint, edge);
-    double t = 0;
-    if (along > 0) t = along < length2 ? along / length2 : 1;
-    const Vec3d offset = t == 1 ? point - triangle.corners[j] : toPoint - t * edge;
-    const double distance2 = glm::dot(offset, offset);
-    if (!(distance2 < best.distance2)) return;
-    best.distance2 = distance2;
-    best.weights = {};
-    best.weights[i] = 1 - t;
-    best.weights[j] = t;
-}
-
-/// Nearest place on a triangle that may be a segment or a point. Every candidate is a true place of the
-/// triangle with its own distance, so rounding can cost a little distance on a needle but never gives a wrong
-/// place.
-Candidate nearestOnTriangle(const BoundaryTriangle& triangle, const Vec3d& point) {
-    const Vec3d u = triangle.corners[1] - triangle.corners[0];
-    const Vec3d v = triangle.corners[2] - triangle.corners[0];
-    const Vec3d w = point - triangle.corners[0];
-    const Vec3d normal = glm::cross(u, v);
-    const double normal2 = glm::dot(normal, normal);
-    Candidate best;
-    if (normal2 > 0) {
-        const double t1 = glm::dot(glm::cross(w, v), normal) / normal2;
-        const double t2 = glm::dot(glm::cross(u, w), normal) / normal2;
-        const double t0 = 1 - t1 - t2;
-        if (t0 > 0 && t1 > 0 && t2 > 0) {
-            const Vec3d offset = w - (t1 * u + t2 * v);
-            best = {glm::dot(offset, offset), {t0, t1, t2}};
-            // Away from the rim, and when the triangle is no needle, no edge can be nearer.
-            const double longest2 = std::max(glm::dot(u, u), glm::dot(v, v));
-            if (std::min({t0, t1, t2}) > 1e-6 && normal2 > 1e-8 * longest2 * longest2) return best;
-        }
-    }
-    offerEdge(triangle, 0, 1, point, best);
-    offerEdge(triangle, 0, 2, point, best);
-    offerEdge(triangle, 1, 2, point, best);
-    return best;
-}
 
 struct PendingNode {
     double distance2;
@@ -115,9 +65,9 @@ struct NearestPointIndex::Impl {
     std::vector<BoundaryTriangle> triangles;  // in the order of the tree
 
     void offerTriangle(std::int64_t place, const Vec3d& point, double& best2,
-                       const BoundaryTriangle*& bestTriangle, Candidate& best) const {
+                       const BoundaryTriangle*& bestTriangle, TrianglePlace& best) const {
         const BoundaryTriangle& triangle = triangles[std::size_t(place)];
-        const Candidate candidate = nearestOnTriangle(triangle, point);
+        const TrianglePlace candidate = nearestOnTriangle(triangle.corners, point);
         if (candidate.distance2 > best2) return;
         if (candidate.distance2 == best2 && bestTriangle &&
             std::tie(bestTriangle->element, bestTriangle->nodes) <=
@@ -184,7 +134,7 @@ std::vector<double> NearestPointIndex::distances(const PointGrid& grid,
                         if (best == kUnwanted) continue;
                         const Vec3d place = placeOf(p);
                         if (!(std::abs(glm::dot(place - a, normal)) <= most)) continue;
-                        best = std::min(best, nearestOnTriangle(triangle, place).distance2);
+                        best = std::min(best, nearestOnTriangle(triangle.corners, place).distance2);
                     }
         });
     std::vector<double> distances;
@@ -201,7 +151,7 @@ NearestPoint NearestPointIndex::find(const Vec3d& pointWorld, double maxDistance
 
     double best2 = maxDistanceWorld * maxDistanceWorld;
     const BoundaryTriangle* bestTriangle = nullptr;
-    Candidate best;
+    TrianglePlace best;
     // Four children a level, at most 16 levels over 2^31 faces.
     std::array<PendingNode, 64> stack;
     std::size_t pending = 0;

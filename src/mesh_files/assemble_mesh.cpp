@@ -411,9 +411,10 @@ MeshFile assembleMesh(const std::string& path, RawMesh raw, const ReadOptions& o
         for (const CellKind kind : block.cells.kinds) ++statistics.cellsOfKind[std::size_t(kind)];
     }
     if (statistics.cells == 0)
-        throw InputError(name + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
-                         " others: points, lines, surfaces or unknown; " +
-                         std::to_string(statistics.blankedCells) + " blanked or ghost cells)");
+        throw InputError(
+            name + ": has no 3D cells (" + std::to_string(statistics.skippedCells) +
+            " others: points, lines, surfaces or unknown; " + std::to_string(statistics.blankedCells) +
+            " blanked or ghost cells); tessera-tetrahedralize makes some of surfaces and points");
     RawBlock block = mergeBlocks(path, raw, options, execution);
     renameTwins(block, statistics);
     selectFields(name, block, options);

@@ -1,7 +1,6 @@
 #include "mesh_files/read_by_format.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <string_view>
 
@@ -21,13 +20,6 @@ constexpr const char* kFormats =
     ".vtu .pvtu .vts .pvts .vtr .pvtr .vti .pvti .vtm .vtk (VTK), .ex2 .e .exo .exii .g (Exodus), .cgns, "
     ".case .encas (EnSight), "
     ".foam (OpenFOAM), .node .ele (TetGen)";
-
-std::string extensionOf(const std::string& path) {
-    std::string extension = std::filesystem::path(path).extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
-    return extension;
-}
 
 bool isOneOf(const std::string& extension, std::initializer_list<const char*> list) {
     return std::find(list.begin(), list.end(), extension) != list.end();

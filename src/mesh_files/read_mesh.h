@@ -37,6 +37,7 @@ struct ImportStatistics {
     double smallestVolumeWorld = 0;  ///< |volume| of elements that are not flat
     double largestVolumeWorld = 0;
     std::vector<std::string> warnings;  ///< one sentence each
+    std::vector<std::string> notes;     ///< what was made of the file, one sentence each
 };
 
 struct ReadOptions {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
-#include <string_view>
 
+#include "mesh_files/number_lines.h"
 #include "mesh_files/raw_mesh.h"
 
 namespace tessera {
@@ -12,11 +14,9 @@ namespace tessera {
 /// becomes the cell field "region". Boundary markers are left out. Throws InputError with file and line.
 RawMesh readTetgen(const std::string& path, const ReadOptions& options);
 
-/// Text that stands in memory, and what messages call it.
-struct NamedText {
-    std::string name;
-    std::string_view bytes;
-};
+/// The nodes of a .node or .poly file, from its first line on: appends points and fields, and returns the
+/// index of the first; none where the file declares no nodes.
+std::optional<std::int64_t> readTetgenNodes(NumberLines& lines, RawBlock& block);
 
 /// readTetgen without files: the contents of both.
 RawMesh parseTetgen(const NamedText& nodes, const NamedText& elements, const ReadOptions& options);

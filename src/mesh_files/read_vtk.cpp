@@ -15,11 +15,13 @@
 #include <vtkXMLPRectilinearGridReader.h>
 #include <vtkXMLPStructuredGridReader.h>
 #include <vtkXMLPUnstructuredGridReader.h>
+#include <vtkXMLPolyDataReader.h>
 #include <vtkXMLRectilinearGridReader.h>
 #include <vtkXMLStructuredGridReader.h>
 #include <vtkXMLUnstructuredGridReader.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <memory>
 #include <new>
@@ -115,6 +117,7 @@ const XmlReaderKind kXmlReaders[] = {
     {"PRectilinearGrid", "VTK XML parallel rectilinear grid", makeXmlReader<vtkXMLPRectilinearGridReader>},
     {"ImageData", "VTK XML image data", makeXmlReader<vtkXMLImageDataReader>},
     {"PImageData", "VTK XML parallel image data", makeXmlReader<vtkXMLPImageDataReader>},
+    {"PolyData", "VTK XML polygons", makeXmlReader<vtkXMLPolyDataReader>},
     {"vtkMultiBlockDataSet", "VTK XML multi-block", makeXmlReader<vtkXMLMultiBlockDataReader>},
 };
 
@@ -213,19 +216,15 @@ void checkCounts(const std::string& path, const DeclaredSize& info, vtkDataObjec
                          " and " + std::to_string(cells) + " could be read");
 }
 
-RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& options,
-             const Execution& execution, OpenVtkFormat openOther) {
-    RawMesh raw;
-    DeclaredSize info;
-    if (format == VtkFormat::xml) info = checkXmlFile(path, allowedFolder(path, options));
-    if (format == VtkFormat::legacy) checkLegacyFile(path);
-    if (format == VtkFormat::xml && info.type == "UnstructuredGrid")
-        if (std::optional<RawMesh> plain = readPlainVtu(path, options, execution)) return std::move(*plain);
+using OpenSource = std::function<VtkSource()>;
+using TakeVtkData = std::function<void(vtkDataObject* data, const VtkSource& source)>;
+
+/// Runs the reader of a file that declares such a size. @param unread gets arrays that nobody asked for.
+void read(const std::string& path, const DeclaredSize& info, const OpenSource& open,
+          const ReadOptions& options, const TakeVtkData& take, ImportStatistics& statistics,
+          std::vector<ArrayInfo>& unread) {
     const VtkMessages messages;
-    VtkSource opened = format == VtkFormat::xml      ? openXml(path, info)
-                       : format == VtkFormat::legacy ? openLegacy(path)
-                                                     : openOther(path, format, options);
-    std::vector<ArrayInfo> unread;
+    VtkSource opened = open();
     if (auto* xml = vtkXMLReader::SafeDownCast(opened.reader)) {
         xml->UpdateInformation();
         selectArrays(xml->GetPointDataArraySelection(), FieldLocation::point, options, unread);
@@ -236,26 +235,65 @@ RawMesh read(const std::string& path, VtkFormat format, const ReadOptions& optio
     throwOnErrors(path, messages);
     vtkDataObject* data = opened.reader->GetOutputDataObject(0);
     if (!data) throw InputError(path + ": could not be read as " + opened.format);
-    if (format == VtkFormat::xml) checkCounts(path, info, data);
-    raw.statistics.format = opened.format;
-    raw.statistics.warnings = opened.warnings;
-    if (opened.renamed) warnOfRenamed(*opened.renamed, raw.statistics);
-    appendVtkData(path, data, opened.nodeIds, options, execution, raw);
+    checkCounts(path, info, data);
+    statistics.format = opened.format;
+    statistics.warnings = opened.warnings;
+    if (opened.renamed) warnOfRenamed(*opened.renamed, statistics);
+    take(data, opened);
     throwOnErrors(path, messages);
-    addVtkWarnings(messages.warnings(), raw.statistics);
+    addVtkWarnings(messages.warnings(), statistics);
+}
+
+RawMesh readCells(const std::string& path, VtkFormat format, const ReadOptions& options,
+                  const Execution& execution, OpenVtkFormat openOther) {
+    RawMesh raw;
+    DeclaredSize info;
+    if (format == VtkFormat::xml) info = checkXmlFile(path, allowedFolder(path, options));
+    if (format == VtkFormat::legacy) checkLegacyFile(path);
+    if (format == VtkFormat::xml && info.type == "UnstructuredGrid")
+        if (std::optional<RawMesh> plain = readPlainVtu(path, options, execution)) return std::move(*plain);
+    const auto open = [&] {
+        return format == VtkFormat::xml      ? openXml(path, info)
+               : format == VtkFormat::legacy ? openLegacy(path)
+                                             : openOther(path, format, options);
+    };
+    std::vector<ArrayInfo> unread;
+    read(
+        path, info, open, options,
+        [&](vtkDataObject* data, const VtkSource& source) {
+            appendVtkData(path, data, source.nodeIds, options, execution, raw);
+        },
+        raw.statistics, unread);
     if (!raw.blocks.empty())
         raw.blocks.front().arrays.insert(raw.blocks.front().arrays.end(), unread.begin(), unread.end());
     return raw;
 }
 
-}  // namespace
+RawSurface readPolygons(const std::string& path, VtkFormat format, const ReadOptions& options,
+                        const Execution& execution) {
+    DeclaredSize info;
+    if (format == VtkFormat::xml)
+        info = checkXmlFile(path, allowedFolder(path, options));
+    else
+        checkLegacyFile(path);
+    RawSurface raw;
+    ImportStatistics statistics;
+    std::vector<ArrayInfo> unread;
+    read(
+        path, info, [&] { return format == VtkFormat::xml ? openXml(path, info) : openLegacy(path); },
+        options,
+        [&](vtkDataObject* data, const VtkSource&) { raw = surfaceOf(path, data, options, execution); },
+        statistics, unread);
+    raw.format = statistics.format;
+    raw.warnings = std::move(statistics.warnings);
+    return raw;
+}
 
-RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
-                const Execution& execution, OpenVtkFormat openOther) {
-    if (!openOther && format != VtkFormat::xml && format != VtkFormat::legacy)
-        throw OtherFormatError(path + ": only VTK XML, legacy VTK and TetGen files are read here");
+/// What libraries throw on damaged files, as errors of the file.
+template <class Read>
+auto explainErrors(const std::string& path, const Read& readIt) {
     try {
-        return read(path, format, options, execution, openOther);
+        return readIt();
     } catch (const std::bad_alloc&) {
         throw TooLargeError(path + ": damaged or too large: reading it asked for more memory than there is");
     } catch (const std::length_error&) {
@@ -265,6 +303,20 @@ RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& op
     } catch (const std::logic_error&) {  // VTK's readers take for granted that names are there
         throw InputError(path + ": damaged: it lacks what a file of its format holds");
     }
+}
+
+}  // namespace
+
+RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
+                const Execution& execution, OpenVtkFormat openOther) {
+    if (!openOther && format != VtkFormat::xml && format != VtkFormat::legacy)
+        throw OtherFormatError(path + ": only VTK XML, legacy VTK and TetGen files are read here");
+    return explainErrors(path, [&] { return readCells(path, format, options, execution, openOther); });
+}
+
+RawSurface readVtkSurface(const std::string& path, VtkFormat format, const ReadOptions& options,
+                          const Execution& execution) {
+    return explainErrors(path, [&] { return readPolygons(path, format, options, execution); });
 }
 
 }  // namespace tessera

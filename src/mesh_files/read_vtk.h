@@ -9,6 +9,8 @@ namespace tessera {
 /// Formats that VTK's readers know.
 enum class VtkFormat { xml, legacy, exodus, cgns, ensight, openfoam };
 
+struct RawSurface;
+
 struct VtkSource;
 using OpenVtkFormat = VtkSource (*)(const std::string& path, VtkFormat format, const ReadOptions& options);
 
@@ -16,5 +18,9 @@ using OpenVtkFormat = VtkSource (*)(const std::string& path, VtkFormat format, c
 /// @param openOther opens what is neither XML nor legacy; null: those throw OtherFormatError.
 RawMesh readVtk(const std::string& path, VtkFormat format, const ReadOptions& options,
                 const Execution& execution, OpenVtkFormat openOther);
+
+/// Reads the 2D cells, or else the points, of an XML or a legacy file.
+RawSurface readVtkSurface(const std::string& path, VtkFormat format, const ReadOptions& options,
+                          const Execution& execution);
 
 }  // namespace tessera

@@ -8,9 +8,12 @@
 #include <vtkDataArray.h>
 #include <vtkDataSet.h>
 #include <vtkDataSetAttributes.h>
+#include <vtkIdList.h>
 #include <vtkIdTypeArray.h>
 #include <vtkImageData.h>
+#include <vtkNew.h>
 #include <vtkPointData.h>
+#include <vtkPointSet.h>
 #include <vtkPoints.h>
 #include <vtkRectilinearGrid.h>
 #include <vtkSmartPointer.h>
@@ -19,6 +22,7 @@
 #include <vtkUnstructuredGrid.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <limits>
 #include <set>
 #include <span>
@@ -486,6 +490,41 @@ void appendDataSet(const std::string& path, vtkDataSet* data, const std::string&
     raw.blocks.push_back(std::move(block));
 }
 
+/// Corners of a 2D cell in order; none for other cells.
+void appendPolygon(int type, std::span<const vtkIdType> nodes, RawSurface& raw, std::int64_t cell,
+                   std::vector<std::int64_t>& sources) {
+    const auto add = [&](std::initializer_list<std::size_t> order) {
+        for (const std::size_t i : order) raw.corners.push_back(std::int32_t(nodes[i]));
+        raw.endPolygon();
+        sources.push_back(cell);
+    };
+    switch (type) {
+        case VTK_TRIANGLE:
+        case VTK_QUADRATIC_TRIANGLE:
+            if (nodes.size() >= 3) add({0, 1, 2});
+            break;
+        case VTK_PIXEL:
+            if (nodes.size() == 4) add({0, 1, 3, 2});
+            break;
+        case VTK_QUAD:
+        case VTK_QUADRATIC_QUAD:
+            if (nodes.size() >= 4) add({0, 1, 2, 3});
+            break;
+        case VTK_POLYGON:
+            if (nodes.size() < 3) break;
+            for (const vtkIdType node : nodes) raw.corners.push_back(std::int32_t(node));
+            raw.endPolygon();
+            sources.push_back(cell);
+            break;
+        case VTK_TRIANGLE_STRIP:
+            for (std::size_t i = 2; i < nodes.size(); ++i)
+                i % 2 == 0 ? add({i - 2, i - 1, i}) : add({i - 1, i - 2, i});
+            break;
+        default:
+            break;
+    }
+}
+
 }  // namespace
 
 void appendVtkData(const std::string& path, vtkDataObject* data, const std::string& nodeIds,
@@ -502,6 +541,53 @@ void appendVtkData(const std::string& path, vtkDataObject* data, const std::stri
         if (auto* set = vtkDataSet::SafeDownCast(iterator->GetCurrentDataObject()))
             appendDataSet(path, set, nodeIds, options, execution, raw);
     }
+}
+
+RawSurface surfaceOf(const std::string& path, vtkDataObject* data, const ReadOptions& options,
+                     const Execution& execution) {
+    auto* set = vtkPointSet::SafeDownCast(data);
+    if (!set || vtkStructuredGrid::SafeDownCast(data))
+        throw InputError(path + ": holds no surface and no points of their own");
+    RawSurface raw;
+    copyPoints(path, set, execution, raw.points);
+    const Ghosts ghosts = ghostsOf(set);
+    std::vector<std::int64_t> sources;  // the cell of every polygon
+    bool hasLines = false;
+    vtkNew<vtkIdList> nodes;
+    for (vtkIdType c = 0; c < set->GetNumberOfCells(); ++c) {
+        const int type = set->GetCellType(c);
+        if (ruleOf(type).solid)
+            throw InputError(path + ": holds 3D cells already, cell " + std::to_string(c) +
+                             " for one: tessera itself reads such files");
+        set->GetCellPoints(c, nodes);
+        const std::span<const vtkIdType> ids(nodes->GetPointer(0), std::size_t(nodes->GetNumberOfIds()));
+        for (const vtkIdType node : ids)
+            if (node < 0 || node >= vtkIdType(raw.points.size()))
+                throw InputError(path + ": cell " + std::to_string(c) + " names node " +
+                                 std::to_string(node) + ", out of range 0 to " +
+                                 std::to_string(std::int64_t(raw.points.size()) - 1));
+        if (!ghosts.hidesCell(c)) appendPolygon(type, ids, raw, c, sources);
+        hasLines |= type == VTK_LINE || type == VTK_POLY_LINE;
+    }
+    if (raw.polygonCount() == 0 && hasLines)
+        throw InputError(path +
+                         ": holds lines and no triangles; tetrahedra are made of closed surfaces or points");
+    RawBlock block;
+    copyFields(path, set->GetPointData(), FieldLocation::point, set->GetNumberOfPoints(), options, execution,
+               block);
+    if (raw.polygonCount() > 0)
+        copyFields(path, set->GetCellData(), FieldLocation::cell, set->GetNumberOfCells(), options, execution,
+                   block);
+    for (Field& field : block.fields) {
+        if (field.location == FieldLocation::cell) {
+            std::vector<double> values;
+            for (const std::int64_t cell : sources)
+                for (int k = 0; k < field.components; ++k) values.push_back(field.at(cell, k));
+            field.values = std::move(values);
+        }
+        raw.fields.push_back(std::move(field));
+    }
+    return raw;
 }
 
 }  // namespace tessera

@@ -196,7 +196,11 @@ void XmlCheck::checkPiece(File& file, const XmlTag& tag) const {
         file.pointsOfPieces += file.piecePoints;
         return;
     }
-    const std::int64_t points = count(file, tag, "NumberOfPoints"), cells = count(file, tag, "NumberOfCells");
+    const std::int64_t points = count(file, tag, "NumberOfPoints");
+    std::int64_t cells = 0;
+    for (const char* kind :
+         {"NumberOfCells", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys"})
+        addCount(cells, count(file, tag, kind));
     file.piecePoints = double(points);
     file.pieceCells = double(cells);
     addCount(file.size.points, points);

@@ -30,7 +30,6 @@ namespace {
 
 constexpr int kTickMs = 50;
 constexpr double kMostSeconds = 10 * 86400;  // that a reader may ask for
-constexpr const char* kSuspicion = "; the file is damaged, or hits a bug of the library that reads it";
 
 std::string inMiB(std::int64_t bytes) {
     return std::to_string((bytes + (1 << 20) - 1) >> 20) + " MiB";
@@ -65,6 +64,11 @@ class IsolatedReading {
     void setLimits(const IsolationLimits& usual);
     void takeLimits(const ReaderProcess& process);
     void takeAnswer(ReaderProcess& process, const TakeAnswer& take);
+    void takeStage();
+    bool makesTetrahedra() const { return stage_ == Stage::tetrahedralizing; }
+    std::string doer() const { return makesTetrahedra() ? ": TetGen " : ": the reader "; }
+    std::string work() const { return makesTetrahedra() ? ": making tetrahedra of it " : ": reading it "; }
+    std::string suspicion() const;
     bool readQuickly(const std::string& executable, const TakeAnswer& take);
     bool awaitReport(ReaderProcess& process);
     void checkTimes(double spentMs, const ReaderProcess& process) const;
@@ -84,6 +88,8 @@ class IsolatedReading {
     IsolationLimits given_, usual_, limits_;
     const Execution& execution_;
     std::vector<std::byte> report_;
+    std::string timeOption_;
+    Stage stage_ = Stage::reading;  ///< what the process is at
 };
 
 /// What was given counts.
@@ -103,19 +109,24 @@ ReportStart IsolatedReading::start() const {
     return start;
 }
 
+std::string IsolatedReading::suspicion() const {
+    return makesTetrahedra() ? "; its input hits a bug of that library"
+                             : "; the file is damaged, or hits a bug of the library that reads it";
+}
+
 void IsolatedReading::failWithGarbage(const std::string& why) const {
-    throw InputError(name_ + ": the reader went wrong and handed over no sound " +
-                     (request_.task == "mesh" ? "mesh" : "answer") + " (" + why + ")" + kSuspicion);
+    throw InputError(name_ + doer() + "went wrong and handed over no sound " +
+                     (request_.task == "mesh" ? "mesh" : "answer") + " (" + why + ")" + suspicion());
 }
 
 void IsolatedReading::failWithEnd(const ProcessEnd& end) const {
-    if (end.byProcessorLimit) throw IoError(name_ + ": the reader " + end.words);
+    if (end.byProcessorLimit) throw IoError(name_ + doer() + end.words);
     // Libraries crash where memory ends, too.
     if (end.bySignal && given_.memoryBytes > 0 && given_.memoryBytes < usual_.memoryBytes)
-        throw InputError(name_ + ": the reader " + end.words + "; the limit on memory given, " +
+        throw InputError(name_ + doer() + end.words + "; the limit on memory given, " +
                          inMiB(given_.memoryBytes) + ", may be too low: for a file like this it would be " +
                          inMiB(usual_.memoryBytes));
-    throw InputError(name_ + ": the reader " + end.words + kSuspicion);
+    throw InputError(name_ + doer() + end.words + suspicion());
 }
 
 bool IsolatedReading::isComplete() const {
@@ -159,8 +170,8 @@ bool IsolatedReading::receive(int descriptor) {
 }
 
 void IsolatedReading::checkTimes(double spentMs, const ReaderProcess& process) const {
-    const std::string taken = name_ + ": reading it took more than ";
-    const std::string usual = ", the limit for a file like this; --max-read-time sets another";
+    const std::string taken = name_ + work() + "took more than ";
+    const std::string usual = ", the limit for a file like this; " + timeOption_ + " sets another";
     if (spentMs >= limits_.seconds * 1e3) {
         if (given_.seconds <= 0) throw InputError(taken + inSeconds(limits_.seconds) + usual);
         throw InputError(taken + inSeconds(limits_.seconds) +
@@ -187,6 +198,16 @@ void IsolatedReading::takeLimits(const ReaderProcess& process) {
     report_.clear();
 }
 
+void IsolatedReading::takeStage() {
+    std::uint64_t number = 0;
+    if (report_.size() != sizeof(ReportStart) + sizeof number) failWithGarbage("its stage makes no sense");
+    std::memcpy(&number, report_.data() + sizeof(ReportStart), sizeof number);
+    if (number > std::uint64_t(Stage::tetrahedralizing)) failWithGarbage("its stage makes no sense");
+    stage_ = Stage(number);
+    report_.clear();
+    execution_.report(stage_, 0, 1);
+}
+
 /// False when the child closed its end before its report was whole.
 bool IsolatedReading::awaitReport(ReaderProcess& process) {
     setLimits(limitsToLook());
@@ -199,6 +220,7 @@ bool IsolatedReading::awaitReport(ReaderProcess& process) {
         execution_.throwIfCancelled();
         send(process.reports());
         const bool open = receive(process.reports());
+        if (isComplete() && start().outcome == ReaderOutcome::stage) takeStage();
         const bool isWhole = isComplete(), givesLimits = isWhole && start().outcome == ReaderOutcome::limits;
         if (givesLimits && hasLimits) failWithGarbage("it sets its limits twice");
         if (givesLimits) takeLimits(process);
@@ -225,7 +247,7 @@ void IsolatedReading::rethrow(ReaderOutcome outcome, const std::string& message)
             throw InternalError(message);
         case ReaderOutcome::overLimit:
             throw InputError(
-                name_ + ": reading it needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
+                name_ + work() + "needs more than " + inMiB(limits_.memoryBytes) + " of memory, " +
                 (given_.memoryBytes > 0
                      ? "the limit given; for a file like this it would be " + inMiB(usual_.memoryBytes)
                      : "the limit for a file like this; --max-memory sets another"));
@@ -271,6 +293,7 @@ bool IsolatedReading::readQuickly(const std::string& executable, const TakeAnswe
 }
 
 void IsolatedReading::run(const IsolatedReader& reader, const TakeAnswer& take) {
+    timeOption_ = reader.timeOption;
     if (!reader.quickExecutable.empty() && readQuickly(reader.quickExecutable, take)) return;
     std::vector<std::string> words = reader.arguments;
     for (std::string& word : startWords(request_.parent)) words.push_back(std::move(word));
@@ -281,16 +304,20 @@ void IsolatedReading::run(const IsolatedReader& reader, const TakeAnswer& take) 
 
 }  // namespace
 
-std::string quickReaderBeside(const std::string& executable) {
+std::string programBeside(const std::string& executable, const std::string& name) {
     namespace fs = std::filesystem;
     std::error_code error;
     const fs::path directory = fs::canonical(executable, error).parent_path();
     for (const char* place : {"", TESSERA_READER_FROM_BINDIR}) {
-        const fs::path candidate = directory / place / "tessera_read_mesh";
+        const fs::path candidate = directory / place / name;
         if (!error && fs::is_regular_file(candidate, error) && ::access(candidate.c_str(), X_OK) == 0)
             return candidate.string();
     }
     return {};
+}
+
+std::string quickReaderBeside(const std::string& executable) {
+    return programBeside(executable, "tessera_read_mesh");
 }
 
 void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
@@ -304,8 +331,14 @@ MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path,
     ReaderRequest request;
     request.path = path;
     request.options = options;
+    return askForMesh(reader, std::move(request), limits, execution);
+}
+
+MeshFile askForMesh(const IsolatedReader& reader, ReaderRequest request, const IsolationLimits& limits,
+                    const Execution& execution) {
+    const std::string name = meshName(request.path, request.options);
     MeshFile file;
-    askReader(reader, std::move(request), meshName(path, options), limits, execution,
+    askReader(reader, std::move(request), name, limits, execution,
               [&](std::span<const std::byte> packet, std::int64_t) {
                   const std::int64_t heldBytes = residentMemoryBytes();
                   file = unpackMesh(packet, execution);

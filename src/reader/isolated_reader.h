@@ -21,8 +21,12 @@ struct IsolatedReader {
     /// and so starts ten times faster. It is given the request alone. Empty: none; one that can't be used is
     /// left out.
     std::string quickExecutable{};
+    /// The option that sets a bound on its time, for messages.
+    std::string timeOption = "--max-read-time";
 };
 
+/// A program that lies beside another, or among the programs that belong to that; empty when there is none.
+std::string programBeside(const std::string& executable, const std::string& name);
 /// The built or installed tessera_read_mesh that belongs to a tessera program; empty when there is none.
 std::string quickReaderBeside(const std::string& executable);
 
@@ -37,6 +41,10 @@ using TakeAnswer = std::function<void(std::span<const std::byte> packet, std::in
 /// std::bad_alloc when this one's own address space is too small.
 void askReader(const IsolatedReader& reader, ReaderRequest request, const std::string& name,
                const IsolationLimits& limits, const Execution& execution, const TakeAnswer& take);
+
+/// askReader for a task whose answer is a mesh (packMesh).
+MeshFile askForMesh(const IsolatedReader& reader, ReaderRequest request, const IsolationLimits& limits,
+                    const Execution& execution);
 
 /// readMesh by askReader. Errors, warnings and the mesh are those of readMesh, bit for bit.
 MeshFile readMeshIsolated(const IsolatedReader& reader, const std::string& path, const ReadOptions& options,

@@ -21,7 +21,7 @@ constexpr std::int64_t kMostElements = std::int64_t(1) << 30;
 template <class Statistics, class Visit>
 void visitNumbers(Statistics& s, const Visit& visit) {
     static_assert(sizeof(ImportStatistics) ==
-                      sizeof(std::string) + (18 + kCellKinds) * 8 + sizeof(std::vector<std::string>),
+                      sizeof(std::string) + (18 + kCellKinds) * 8 + 2 * sizeof(std::vector<std::string>),
                   "a new member of ImportStatistics needs its line below");
     for (auto& count : s.cellsOfKind) visit(count);
     visit(s.cells), visit(s.skippedCells), visit(s.blankedCells), visit(s.higherOrderCells);
@@ -46,6 +46,7 @@ std::string headOf(const MeshFile& file) {
     head.put(file.statistics.format);
     visitNumbers(file.statistics, [&](auto number) { head.put(number); });
     head.put(file.statistics.warnings);
+    head.put(file.statistics.notes);
     return head.take();
 }
 
@@ -72,8 +73,10 @@ MeshFile readHead(const ReceivedPacket& packet, std::int64_t& nodes, std::int64_
         number = head.get<std::remove_reference_t<decltype(number)>>();
         if (!(number >= 0)) throw DamagedPacket("a number is below 0");
     });
-    file.statistics.warnings = head.getTexts();
-    for (std::string& warning : file.statistics.warnings) warning = messageLine(warning);
+    for (auto* sentences : {&file.statistics.warnings, &file.statistics.notes}) {
+        *sentences = head.getTexts();
+        for (std::string& sentence : *sentences) sentence = messageLine(sentence);
+    }
     head.expectEnd();
     return file;
 }

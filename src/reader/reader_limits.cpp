@@ -1,7 +1,6 @@
 #include "reader/reader_limits.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <optional>
 
@@ -58,9 +57,7 @@ double bytesOfFolder(const std::filesystem::path& folder) {
 
 InputSize sizeOfInput(const std::string& path, const std::optional<std::string>& folder) {
     const std::filesystem::path given(path);
-    std::string extension = given.extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return char(std::tolower(c)); });
+    const std::string extension = extensionOf(path);
     std::error_code error;
     if (extension == ".foam" && std::filesystem::exists(given, error))
         return {bytesOfFolder(given.parent_path()), 0};

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kFixedWords = 11;
 // The other program may be of another build: what they say to each other has a number, to be raised with each
 // change.
-constexpr const char* kProtocol = TESSERA_VERSION "/5";
+constexpr const char* kProtocol = TESSERA_VERSION "/6";
 constexpr const char* kByItself = "the reader of meshes is started by tessera itself";
 
 template <class Number>

@@ -12,6 +12,7 @@ namespace tessera {
 
 /// What the reading process has to say, mostly how reading ended.
 enum class ReaderOutcome : std::uint32_t {
+    stage,           ///< a Stage follows, as 8 bytes, which begins now
     limits,          ///< usual IsolationLimits for this file follow; then it reads
     answerInMemory,  ///< the answer's packet is in the shared memory
     answerFollows,   ///< it follows in the socket, where a limit on file sizes forbids the shared memory

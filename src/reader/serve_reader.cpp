@@ -215,6 +215,11 @@ void serve(std::int64_t parent, std::span<const ReaderTask> tasks) {
 
 }  // namespace
 
+void reportStage(Stage stage) {
+    const auto number = std::uint64_t(stage);
+    report(ReaderOutcome::stage, &number, sizeof number);
+}
+
 ReaderTask meshTask(MeshReader read) {
     return {"mesh", [](const ReaderRequest& request) { return defaultLimits(request.path, request.options); },
             [read = std::move(read)](const ReaderRequest& request, const IsolationLimits&,

@@ -22,6 +22,9 @@ struct ReaderTask {
         run;
 };
 
+/// Tells the process that asked what this one is at. Only within ReaderTask::run.
+void reportStage(Stage stage);
+
 using MeshReader =
     std::function<MeshFile(const std::string& path, const ReadOptions& options, const Execution& execution)>;
 

@@ -135,7 +135,7 @@ TetMesh hangingNodeMesh(int coarseCells, int fineCells) {
     return mesh;
 }
 
-TetMesh gradedDelaunayMesh(int points, double power, std::uint64_t seed) {
+std::vector<Vec3d> gradedPoints(int points, double power, std::uint64_t seed) {
     Random random(seed);
     std::vector<Vec3d> places;
     for (int i = 0; i < points; ++i) {
@@ -143,7 +143,11 @@ TetMesh gradedDelaunayMesh(int points, double power, std::uint64_t seed) {
         for (int a = 0; a < 3; ++a) p[a] = graded(p[a], power);
         places.push_back(p);
     }
-    return delaunayMesh(places);
+    return places;
+}
+
+TetMesh gradedDelaunayMesh(int points, double power, std::uint64_t seed) {
+    return delaunayMesh(gradedPoints(points, power, seed));
 }
 
 TetMesh thinTetsMesh(ThinKind kind, double aspect, double size, int count, std::uint64_t seed) {

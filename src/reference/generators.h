@@ -31,7 +31,10 @@ TetMesh boundaryLayerMesh(int n, double thinnest);
 /// A coarse box beside a fine one: fine nodes hang on the coarse faces.
 TetMesh hangingNodeMesh(int coarseCells, int fineCells);
 
-/// Delaunay mesh of random points in the unit box with x = 1/2 + sign(2u - 1) |2u - 1|^power / 2.
+/// Random points in the unit box with x = 1/2 + sign(2u - 1) |2u - 1|^power / 2.
+std::vector<Vec3d> gradedPoints(int points, double power, std::uint64_t seed);
+
+/// Delaunay mesh of such points; by exact arithmetic, see delaunayMesh.
 TetMesh gradedDelaunayMesh(int points, double power, std::uint64_t seed);
 
 enum class ThinKind { sliver, needle, spindle, cap };

@@ -151,7 +151,19 @@ class BadInput(AppTest):
 
     def test_no_3d_cells(self):
         self.write("flat.vtu", vtu_text(cells=[(0, 1, 3), (0, 3, 2)], cell_type=5))
-        self.resample_fails("flat.vtu", "flat.vtu")
+        self.resample_fails("flat.vtu tessera-tetrahedralize", "flat.vtu")
+
+    def test_a_surface_where_nothing_makes_tetrahedra(self):
+        """A program that stands alone: what it would start isn't beside it."""
+        self.write("box.off", "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")
+        alone = self.folder / "tessera"
+        shutil.copy2(TESSERA, alone)
+        before = sorted(os.listdir(self.folder))
+        for command in (["resample", "box.off", "-o", "out.vdb"], ["info", "box.off"], ["verify", "box.off", "nothing.vdb"]):
+            result = subprocess.run([alone, *command], cwd=self.folder, capture_output=True, text=True)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertRegex(result.stderr, "^tessera: (box.off: a surface or points, no cells; tessera-tetrahedralize, .*isn't installed|nothing.vdb).*\n$")
+        self.assertEqual(sorted(os.listdir(self.folder)), before)
 
     def test_no_such_field_lists_those_there(self):
         self.write("two.vtu", vtu_text(fields={"pressure": range(8), "heat": range(8)}))

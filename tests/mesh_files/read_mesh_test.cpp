@@ -544,7 +544,7 @@ TEST(ReadOpenFoam, ReadsACaseWithItsLastTime) {
 TEST(WriteTets, ReadsBackBitForBit) {
     const TemporaryFolder folder;
     const MeshFile file = read(TESSERA_DATA_DIR "/freefem-stokes-sphere/stokes_p1.vtu");
-    writeTets(file.mesh, folder.file("tets.vtu"));
+    writeTets(file.mesh, folder.file("tets.vtu"), {});
     const MeshFile again = read(folder.file("tets.vtu"));
     EXPECT_EQ(again.mesh.points, file.mesh.points);
     EXPECT_EQ(again.mesh.tets, file.mesh.tets);
@@ -553,7 +553,7 @@ TEST(WriteTets, ReadsBackBitForBit) {
         EXPECT_EQ(field(again, expected.name).values, expected.values);
         EXPECT_EQ(field(again, expected.name).location, expected.location);
     }
-    EXPECT_THROW(writeTets(file.mesh, folder.file("absent/tets.vtu")), IoError);
+    EXPECT_THROW(writeTets(file.mesh, folder.file("absent/tets.vtu"), {}), IoError);
     EXPECT_FALSE(std::filesystem::exists(folder.file("absent")));
 }
 

@@ -1,4 +1,4 @@
-#include "job/html_text.h"
+#include "files/html_text.h"
 
 #include "base/text.h"
 

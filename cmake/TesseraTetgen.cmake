@@ -1,0 +1,12 @@
+# TetGen, for tessera-tetrahedralize alone; the package that others find doesn't need it.
+if(TESSERA_BUILD_IO AND TESSERA_BUILD_TETRAHEDRALIZE)
+  find_path(TETGEN_INCLUDE_DIR tetgen.h)
+  find_library(TETGEN_LIBRARY tet)
+  if(TETGEN_INCLUDE_DIR AND TETGEN_LIBRARY)
+    add_library(tessera_tet INTERFACE IMPORTED)
+    target_include_directories(tessera_tet SYSTEM INTERFACE ${TETGEN_INCLUDE_DIR})
+    target_link_libraries(tessera_tet INTERFACE ${TETGEN_LIBRARY})
+  else()
+    message(STATUS "TetGen (libtet1.5-dev) isn't there: no tessera-tetrahedralize")
+  endif()
+endif()

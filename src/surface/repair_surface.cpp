@@ -1,0 +1,109 @@
+#include "surface/repair_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mesh/mesh_quality.h"
+#include "surface/shell_nest.h"
+#include "surface/surface_edges.h"
+#include "surface/unfit_triangles.h"
+
+namespace tessera {
+
+namespace {
+
+/// Takes points at the place of an earlier one out, with their values.
+std::int64_t mergePoints(Surface& surface, const Execution& execution) {
+    const std::vector<std::int32_t> first = firstNodeAtPlace(surface.points, execution);
+    std::vector<std::int32_t> newOf(first.size());
+    std::size_t kept = 0;
+    for (std::size_t p = 0; p < first.size(); ++p) {
+        const auto earlier = std::size_t(first[p]);
+        if (earlier != p) {
+            newOf[p] = newOf[earlier];
+            continue;
+        }
+        newOf[p] = std::int32_t(kept);
+        surface.points[kept] = surface.points[p];
+        for (Field& field : surface.fields)
+            for (std::size_t c = 0, n = std::size_t(field.components); c < n; ++c)
+                field.values[kept * n + c] = field.values[p * n + c];
+        ++kept;
+    }
+    const auto merged = std::int64_t(surface.points.size() - kept);
+    surface.points.resize(kept);
+    for (Field& field : surface.fields) field.values.resize(kept * std::size_t(field.components));
+    for (auto& triangle : surface.triangles)
+        for (std::int32_t& point : triangle) point = newOf[std::size_t(point)];
+    return merged;
+}
+
+std::int64_t removeMarked(Surface& surface, const std::vector<std::uint8_t>& marked) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < surface.triangles.size(); ++t)
+        if (!marked[t]) surface.triangles[kept++] = surface.triangles[t];
+    const auto removed = std::int64_t(surface.triangles.size() - kept);
+    surface.triangles.resize(kept);
+    return removed;
+}
+
+void turn(std::array<std::int32_t, 3>& triangle) {
+    std::swap(triangle[1], triangle[2]);
+}
+
+/// Of every part 1 when it is a closed shell outside of all others that looks inwards.
+std::vector<std::uint8_t> findInwardParts(const Surface& surface, const SurfaceParts& found,
+                                          std::span<const std::uint8_t> leftOut, const Execution& execution) {
+    std::vector<std::int32_t> shellOfPart(found.parts.size(), -1), partOfShell;
+    for (std::size_t p = 0; p < found.parts.size(); ++p)
+        if (found.parts[p].closed && found.parts[p].orientable) {
+            shellOfPart[p] = std::int32_t(partOfShell.size());
+            partOfShell.push_back(std::int32_t(p));
+        }
+    std::vector<std::int32_t> shellOf(surface.triangles.size(), -1);
+    for (std::size_t t = 0; t < shellOf.size(); ++t) shellOf[t] = shellOfPart[std::size_t(found.partOf[t])];
+    const TriangleTree tree(surface, leftOut, execution);
+    const ShellNest nest(tree, shellOf, partOfShell.size(), execution);
+    const std::vector<double> volumes = nest.volumesWorld(execution);
+    const auto around = nest.shellsAround(execution);
+    std::vector<std::uint8_t> inward(found.parts.size(), 0);
+    for (std::size_t s = 0; s < partOfShell.size(); ++s)
+        inward[std::size_t(partOfShell[s])] = around[s].empty() && volumes[s] < 0;
+    return inward;
+}
+
+/// Returns how many triangles it turned.
+std::int64_t turnTriangles(Surface& surface, const Execution& execution) {
+    // Triangles without area count here: they too have neighbours over their edges.
+    const std::vector<std::uint8_t> none(surface.triangles.size(), 0);
+    SurfaceParts found = findParts(surface, edgeUses(surface, none), none);
+    for (std::size_t t = 0; t < found.turned.size(); ++t) {
+        if (!found.parts[std::size_t(found.partOf[t])].orientable) found.turned[t] = 0;
+        if (found.turned[t]) turn(surface.triangles[t]);
+    }
+    const std::vector<std::uint8_t> inward = findInwardParts(surface, found, none, execution);
+    std::int64_t turned = 0;
+    for (std::size_t t = 0; t < found.turned.size(); ++t) {
+        const std::uint8_t isInward = inward[std::size_t(found.partOf[t])];
+        if (isInward) turn(surface.triangles[t]);
+        turned += found.turned[t] != isInward;
+    }
+    return turned;
+}
+
+}  // namespace
+
+SurfaceRepair repairSurface(Surface& surface, const Execution& execution) {
+    SurfaceRepair repair;
+    repair.mergedPoints = mergePoints(surface, execution);
+    repair.removedTriangles = removeMarked(surface, trianglesWithCornerTwice(surface));
+    const std::vector<std::uint8_t> none(surface.triangles.size(), 0);
+    repair.removedTriangles += removeMarked(surface, laterDuplicates(surface, none));
+    repair.turnedTriangles = turnTriangles(surface, execution);
+    return repair;
+}
+
+}  // namespace tessera

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+#include "surface/surface.h"
+#include "tessera/execution.h"
+
+namespace tessera {
+
+/// What a repair did.
+struct SurfaceRepair {
+    std::int64_t mergedPoints = 0;      ///< at exactly the place of another
+    std::int64_t removedTriangles = 0;  ///< with a corner twice, or there twice
+    std::int64_t turnedTriangles = 0;
+};
+
+/// Merges points at exactly one place (values of the first), removes triangles of zero area whose removal
+/// leaves no hole (two corners the same) and those that are there twice, turns triangles so that neighbours
+/// agree, by the majority of each shell, and then the outermost shells outwards. Holes and crossings stay.
+SurfaceRepair repairSurface(Surface& surface, const Execution& execution);
+
+}  // namespace tessera
