@@ -44,12 +44,27 @@ if(TARGET tessera)
   endif()
 endif()
 
+# Tests of the program that makes tetrahedra, from outside; docs/testing.md tells of the long runs.
+if(TARGET tessera_tetrahedralize)
+  set(tetrahedralize ${CMAKE_CURRENT_SOURCE_DIR}/tetrahedralize)
+  foreach(suite Bad Options Good Fields Repair Points Sizes Resample)
+    add_test(NAME tetrahedralize_test.${suite}
+      COMMAND ${TESSERA_PYTHON} -B ${tetrahedralize}/tetrahedralize_test.py --program $<TARGET_FILE:tessera_tetrahedralize>
+              --tessera $<TARGET_FILE:tessera> ${suite})
+  endforeach()
+  add_test(NAME mesh_statistics_test COMMAND ${TESSERA_PYTHON} -B ${tetrahedralize}/mesh_statistics_test.py)
+  add_test(NAME mutated_surfaces
+    COMMAND ${TESSERA_PYTHON} -B ${tetrahedralize}/mutated_surfaces.py --program $<TARGET_FILE:tessera_tetrahedralize> --count 60 --seed 1
+            --jobs 2 --keep ${PROJECT_BINARY_DIR}/mutated_surfaces)
+  set_tests_properties(mutated_surfaces PROPERTIES PROCESSORS 2)
+endif()
+
 # What runs under the sanitizers in CI: for addresses every layer's own tests and the contract's, not the long passes over real meshes
 # nor the command line, which takes longer to compile than all layers; for threads the tests of what runs on several.
-set(sanitized_areas base gl mesh mirror compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams surface measure extend ray_cast mesh_cast
+set(sanitized_areas base gl mesh mirror check_surface extend_fields compare plane split read software raster_plan raster_run device registry brick refine wish schedule pool seams surface measure extend ray_cast mesh_cast
   contract_format contract_test hard_cases perturbed vdb image scene slice library cache)
 if(TESSERA_SANITIZE MATCHES thread)
-  set(sanitized_areas base gl_test compare software contract_test brick_store refine schedule seams measure)
+  set(sanitized_areas base gl_test check_surface compare software contract_test brick_store refine schedule seams measure)
 endif()
 list(JOIN sanitized_areas "|" sanitized_areas)
 get_property(tests_here DIRECTORY PROPERTY TESTS)

@@ -219,9 +219,13 @@ class TableLine {
     bool isDone_ = false;
 };
 
-/// A number, or what stands for none.
-std::optional<double> tableNumber(std::string_view word) {
-    if (word.empty()) return std::numeric_limits<double>::quiet_NaN();
+/// A number, or what stands for none. Where commas don't separate words they may stand before decimals.
+std::optional<double> tableNumber(std::string_view word, char separator) {
+    if (word.empty() || word == "NA" || word == "N/A") return std::numeric_limits<double>::quiet_NaN();
+    std::string withPoint;
+    if (separator != ',' && word.find('.') == std::string_view::npos)
+        if (const std::size_t comma = word.find(','); comma != std::string_view::npos)
+            word = withPoint.append(word).replace(comma, 1, 1, '.');
     if (word.front() == '+') word.remove_prefix(1);
     double value = 0;
     const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
@@ -250,6 +254,7 @@ class Table {
 
     const NamedText& text_;
     std::string_view rest_, line_;
+    std::string_view comment_;  // the last one before the first line of numbers
     std::int64_t lineNumber_ = 0;
     char separator_ = ',';
     std::vector<std::string> names_;  // of the columns
@@ -268,23 +273,33 @@ bool Table::nextLine() {
         rest_.remove_prefix(std::min(end + 1, rest_.size()));
         if (line_.ends_with('\r')) line_.remove_suffix(1);
         const std::size_t first = line_.find_first_not_of(" \t");
-        if (first != std::string_view::npos && line_[first] != '#') return true;
+        if (first == std::string_view::npos) continue;
+        if (line_[first] != '#') return true;
+        comment_ = line_.substr(first + 1);
     }
     return false;
 }
 
-/// Where there are no names, columns have those of their places.
+/// Names stand in the first line or, as numpy writes them, in a comment before it. Where there are none
+/// columns are called by their places.
 void Table::readNames() {
     TableLine words(line_, separator_);
     bool isAllNumbers = true;
     while (const auto word = words.next()) {
-        isAllNumbers &= tableNumber(*word).has_value();
+        isAllNumbers &= tableNumber(*word, separator_).has_value();
         names_.push_back(plainName(std::string(*word)));
     }
     if (names_.size() < 3)
         fail("found " + std::to_string(names_.size()) + " columns, expected the 3 coordinates of a point");
     hasRow_ = isAllNumbers;
     if (!isAllNumbers) return;
+    std::vector<std::string> commented;
+    TableLine comment(comment_, separator_);
+    while (const auto word = comment.next()) commented.push_back(plainName(std::string(*word)));
+    if (commented.size() == names_.size()) {
+        names_ = std::move(commented);
+        return;
+    }
     for (std::size_t c = 0; c < names_.size(); ++c) names_[c] = "column_" + std::to_string(c + 1);
 }
 
@@ -334,7 +349,7 @@ void Table::readRow(RawSurface& raw) {
     row_.clear();
     TableLine words(line_, separator_);
     while (const auto word = words.next()) {
-        const auto number = tableNumber(*word);
+        const auto number = tableNumber(*word, separator_);
         if (!number) fail("expected a number, found '" + printable(word->substr(0, 24)) + "'");
         row_.push_back(*number);
         if (row_.size() > names_.size()) break;

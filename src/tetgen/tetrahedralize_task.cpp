@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <optional>
 
 #include "base/machine_memory.h"
@@ -17,6 +16,7 @@
 #include "reader/mesh_packet.h"
 #include "surface/check_surface.h"
 #include "surface/extend_fields.h"
+#include "surface/winding_number.h"
 #include "tessera/error.h"
 #include "tetgen/run_tetgen.h"
 
@@ -121,32 +121,6 @@ std::int64_t dropLongElements(double limit, TetgenOutput& mesh) {
     return std::int64_t(std::erase_if(mesh.tets, isLong));
 }
 
-/// How often the surface of one shell, or of all, runs around a place: the solid angle that it takes up
-/// there.
-double windingNumber(const Surface& surface, const std::vector<std::int32_t>& shellOf, std::int32_t shell,
-                     const Vec3d& place) {
-    double angle = 0;
-    for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
-        if (shellOf[t] != shell) continue;
-        std::array<Vec3d, 3> to;
-        for (std::size_t i = 0; i < 3; ++i)
-            to[i] = surface.points[std::size_t(surface.triangles[t][i])] - place;
-        const double a = glm::length(to[0]), b = glm::length(to[1]), c = glm::length(to[2]);
-        // After: A. van Oosterom and J. Strackee, The Solid Angle of a Plane Triangle, IEEE Transactions on
-        // Biomedical Engineering 1983.
-        angle += 2 * std::atan2(glm::dot(to[0], glm::cross(to[1], to[2])),
-                                a * b * c + glm::dot(to[0], to[1]) * c + glm::dot(to[1], to[2]) * a +
-                                    glm::dot(to[2], to[0]) * b);
-    }
-    return angle / (4 * std::numbers::pi);
-}
-
-bool isInside(const Surface& surface, const SurfaceShells& shells, const Vec3d& place) {
-    for (std::size_t s = 0; s < shells.shells.size(); ++s)
-        if (std::abs(windingNumber(surface, shells.shellOf, std::int32_t(s), place)) > 0.5) return true;
-    return false;
-}
-
 class Tetrahedralization {
   public:
     Tetrahedralization(const ReaderRequest& request, const Execution& execution)
@@ -205,9 +179,9 @@ void Tetrahedralization::takeSeeds() {
     auto& regions = options_.regions;
     regions.insert(regions.end(), file_.regions.begin(), file_.regions.end());
     const auto check = [&](const char* what, const Vec3d& place) {
-        if (!isInside(surface_, shells_, place))
+        if (!(windingNumber(surface_, place) > 0.5))
             throw InputError(path_ + ": the " + what + " at " + placeText(place) +
-                             " lies outside of the surface");
+                             " lies outside of the volume that the surface bounds");
     };
     for (const Vec3d& hole : holes) check("hole", hole);
     for (const RegionSeed& seed : regions) check("region", seed.placeWorld);

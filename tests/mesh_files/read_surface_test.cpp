@@ -118,6 +118,8 @@ TEST_F(ReadSurface, ReadsTablesOfAnyKind) {
     EXPECT_EQ(vector[0].name, "v");
     EXPECT_EQ(vector[0].components, 2);
     EXPECT_TRUE(std::isnan(vector[0].values[2]));
+    EXPECT_EQ(expectPoints("# made by hand\n# x y z T\n1 2 3 7\n4 5 6.5 NA\n")[0].name, "T");
+    EXPECT_EQ(expectPoints("x;y;z;T\n1,0;2;3;7,5\n4;5;6,5;8\n")[0].values, (std::vector<double>{7.5, 8}));
     EXPECT_EQ(refusal("b.csv", "x,y,z\n1,2,3\n1,2\n"), "line 3: has 2 of 3 columns");
     EXPECT_EQ(refusal("c.csv", "x,y,z\n1,2,wide\n"), "line 2: expected a number, found 'wide'");
     EXPECT_EQ(refusal("d.csv", "x,y,z,T,T\n1,2,3,4,5\n"), "line 1: two columns are called 'T'");
