@@ -47,7 +47,7 @@ endif()
 # Tests of the program that makes tetrahedra, from outside; docs/testing.md tells of the long runs.
 if(TARGET tessera_tetrahedralize)
   set(tetrahedralize ${CMAKE_CURRENT_SOURCE_DIR}/tetrahedralize)
-  foreach(suite Bad Options Good Fields Repair Points Sizes Resample)
+  foreach(suite Bad Options Good Parts Fields Repair Points Sizes Resample)
     add_test(NAME tetrahedralize_test.${suite}
       COMMAND ${TESSERA_PYTHON} -B ${tetrahedralize}/tetrahedralize_test.py --program $<TARGET_FILE:tessera_tetrahedralize>
               --tessera $<TARGET_FILE:tessera> ${suite})

@@ -50,9 +50,10 @@ struct InputStep {
 };
 
 /// Reads a mesh file of any format in the README, or a step of a .pvd file. Cells are split into tetrahedra
-/// so that both sides of a shared face are cut alike. Throws InputError, naming the file and the place, when
-/// it is missing, damaged, of unknown format, without 3D cells or without such a field; IoError when the
-/// separate process can't be started; Cancelled.
+/// so that both sides of a shared face are cut alike; of surfaces and points the program
+/// tessera-tetrahedralize makes tetrahedra, where it is installed. Throws InputError, naming the file and the
+/// place, when it is missing, damaged, of unknown format, without 3D cells or without such a field; IoError
+/// when the separate process can't be started; Cancelled.
 InputMesh read(const std::string& path, const InputOptions& options = {}, const Execution& execution = {});
 /// The same for a step of a series; `options.step` is of files that have several steps themselves.
 InputMesh read(const InputStep& step, const InputOptions& options = {}, const Execution& execution = {});

@@ -28,6 +28,7 @@ MeshFile openMesh(const std::string& path, const ReadOptions& given, Job& job) {
         return openMesh(step.files[0], readOptions(step, options.fields, -1), job);
     }
     if (isSurfaceName(path)) {
+        requireTetrahedralizer(job.tetrahedralizer, path);
         job.say(fmt::format("{}: holds no cells; {} makes tetrahedra of it\n", path, kTetrahedralizer));
         return makeTetrahedra(path, options, {}, job);
     }

@@ -42,7 +42,7 @@ bool NumberLines::atEnd() {
 
 std::string_view NumberLines::word() {
     skipSpaces();
-    const std::string_view found = line_.substr(0, line_.find_first_of(" \t\r,"));
+    const std::string_view found = line_.substr(0, line_.find_first_of(separators_));
     line_.remove_prefix(found.size());
     return found;
 }

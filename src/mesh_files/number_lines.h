@@ -20,12 +20,16 @@ struct NamedText {
 /// Bytes that a terminal can't show as they are, as \xNN.
 std::string printable(std::string_view word);
 
-/// Numbers and words of a text file, line by line; '#' starts a comment, empty lines don't count. Blanks and
-/// commas stand between them.
+inline constexpr const char* kBlanksAndCommas = " \t\r,";
+inline constexpr const char* kOnlyBlanks = " \t\r";
+
+/// Numbers and words of a text file, line by line; '#' starts a comment, empty lines don't count.
 class NumberLines {
   public:
-    explicit NumberLines(const NamedText& text)
-        : name_(text.name), bytes_(text.bytes.size()), rest_(text.bytes) {}
+    explicit NumberLines(const NamedText& text, const char* separators = kBlanksAndCommas)
+        : name_(text.name), bytes_(text.bytes.size()), rest_(text.bytes), separators_(separators) {
+        if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
+    }
 
     /// Moves to the next line with content. Throws InputError when there is none.
     void next(const char* expected);
@@ -57,12 +61,13 @@ class NumberLines {
     [[noreturn]] void fail(const std::string& why) const;
 
   private:
-    void skipSpaces() { line_.remove_prefix(std::min(line_.find_first_not_of(" \t\r,"), line_.size())); }
+    void skipSpaces() { line_.remove_prefix(std::min(line_.find_first_not_of(separators_), line_.size())); }
 
     std::string name_;
     std::size_t bytes_;
     std::string_view rest_;
     std::string_view line_;
+    const char* separators_;
     std::int64_t lineNumber_ = 0;
 };
 

@@ -11,6 +11,7 @@
 namespace tessera {
 
 inline constexpr const char* kStlFormat = "STL";
+inline constexpr const char* kPolyFormat = "TetGen surface";
 
 /// A surface as its file has it, with polygons of any number of corners.
 struct RawSurface {

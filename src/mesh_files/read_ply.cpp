@@ -67,11 +67,11 @@ class PlyReader {
 };
 
 void PlyReader::readHead() {
-    constexpr std::string_view kEnd = "end_header";
+    constexpr std::string_view kEnd = "\nend_header";
     if (!text_.bytes.starts_with("ply"))
         throw InputError(text_.name + ": isn't a .ply file: it doesn't begin with ply");
-    const std::size_t end = text_.bytes.find(kEnd);
-    const std::size_t line = end == std::string_view::npos ? end : text_.bytes.find('\n', end);
+    const std::size_t end = text_.bytes.find(kEnd);  // not within a comment: with the line's end before it
+    const std::size_t line = end == std::string_view::npos ? end : text_.bytes.find('\n', end + 1);
     if (line == std::string_view::npos)
         throw InputError(text_.name + ": cut off inside its head: there is no end_header");
     at_ = line + 1;
@@ -278,6 +278,9 @@ RawSurface PlyReader::read() {
             hasFaces = true;
             readFaces(element);
         } else {
+            if (element.name == "tristrips" && element.count > 0)
+                throw InputError(text_.name +
+                                 ": strips of triangles (element 'tristrips') aren't read, faces are");
             const std::int64_t items = element.properties.empty() ? 0 : element.count;
             for (std::int64_t i = 0; i < items; ++i) readItem(element, nullptr);
         }

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "base/text.h"
+
 namespace tessera {
 
 namespace {
@@ -32,11 +34,11 @@ void readBinary(const NamedText& text, RawSurface& raw) {
 }
 
 void readText(const NamedText& text, RawSurface& raw) {
-    NumberLines lines(text);
+    NumberLines lines(text, kOnlyBlanks);
     int corners = 0;
     bool isInFacet = false, isEnded = false;
     while (lines.tryNext()) {
-        const std::string_view keyword = lines.word();
+        const std::string keyword = lowerCase(lines.word());
         if (keyword == "facet") {
             if (isInFacet) lines.fail("a facet begins within another");
             isInFacet = true;
@@ -46,6 +48,7 @@ void readText(const NamedText& text, RawSurface& raw) {
             if (++corners > 3) lines.fail("a facet has more than 3 corners");
             Vec3d place{0};
             for (int k = 0; k < 3; ++k) place[k] = lines.read<double>("a coordinate");
+            if (!lines.atEnd()) lines.fail("a vertex has more than 3 coordinates");
             raw.points.push_back(place);
         } else if (keyword == "endfacet") {
             if (corners != 3) lines.fail("a facet has " + std::to_string(corners) + " corners, expected 3");
@@ -55,6 +58,12 @@ void readText(const NamedText& text, RawSurface& raw) {
         isEnded = keyword == "endsolid";
     }
     if (!isEnded) throw InputError(text.name + ": cut off: its last line isn't endsolid");
+}
+
+bool isText(std::string_view bytes) {
+    if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
+    bytes.remove_prefix(std::min(bytes.find_first_not_of(" \t\r\n"), bytes.size()));
+    return lowerCase(bytes.substr(0, 5)) == "solid";
 }
 
 }  // namespace
@@ -67,7 +76,7 @@ RawSurface readStl(const NamedText& text) {
     const std::uint64_t declared = size >= kHeadBytes ? declaredTriangles(text.bytes) : 0;
     if (size >= kHeadBytes && kHeadBytes + declared * kTriangleBytes == size)
         readBinary(text, raw);
-    else if (text.bytes.starts_with("solid"))
+    else if (isText(text.bytes))
         readText(text, raw);
     else if (size < kHeadBytes)
         throw InputError(text.name + ": isn't an .stl file, or cut off: it has " + std::to_string(size) +

@@ -4,16 +4,17 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "files/input_file.h"
 #include "files/named_file.h"
-#include "mesh/mesh_quality.h"
 #include "mesh_files/raw_surface.h"
 #include "mesh_files/read_ply.h"
 #include "mesh_files/read_stl.h"
 #include "mesh_files/read_surface_text.h"
 #include "mesh_files/read_vtk.h"
 #include "mesh_files/triangulate.h"
+#include "surface/repair_surface.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -92,28 +93,16 @@ void takeFields(RawSurface& raw, const std::vector<std::int64_t>& sources, Surfa
             for (int c = 0; c < field.components; ++c) ofTriangles.values.push_back(field.at(source, c));
         surface.fields.push_back(atPoints(ofTriangles, surface));
     }
-    std::map<std::string, int> known;
-    for (Field& field : surface.fields)
-        if (const int before = known[field.name]++; before > 0)
-            field.name.append(1, '_').append(std::to_string(before + 1));
-}
-
-/// An .stl file has the corners of every triangle anew.
-void joinCorners(Surface& surface, const Execution& execution) {
-    const std::vector<std::int32_t> first = firstNodeAtPlace(surface.points, execution);
-    std::vector<std::int32_t> number(surface.points.size());
-    std::size_t kept = 0;
-    for (std::size_t p = 0; p < first.size(); ++p) {
-        if (std::size_t(first[p]) == p) {
-            number[p] = std::int32_t(kept);
-            surface.points[kept++] = surface.points[p];
-        } else {
-            number[p] = number[std::size_t(first[p])];
-        }
+    std::set<std::string> known;
+    for (const Field& field : surface.fields) known.insert(field.name);
+    std::set<std::string> taken;
+    for (Field& field : surface.fields) {
+        if (taken.insert(field.name).second) continue;
+        const std::string name = field.name;
+        for (int n = 2; known.contains(field.name); ++n) field.name = name + "_" + std::to_string(n);
+        known.insert(field.name);
+        taken.insert(field.name);
     }
-    surface.points.resize(kept);
-    for (auto& triangle : surface.triangles)
-        for (std::int32_t& corner : triangle) corner = number[std::size_t(corner)];
 }
 
 }  // namespace
@@ -128,6 +117,9 @@ bool isSurfaceName(const std::string& path) {
 }
 
 SurfaceFile readSurface(const std::string& path, const ReadOptions& options, const Execution& execution) {
+    if (options.timeStep > 0)
+        throw InputError(path + ": there is no time step " + std::to_string(options.timeStep) +
+                         "; it has 1, counted from 0");
     RawSurface raw = readRaw(path, options, execution);
     if (raw.points.empty()) throw InputError(path + ": holds no point");
     checkPoints(path, raw.points);
@@ -136,7 +128,9 @@ SurfaceFile readSurface(const std::string& path, const ReadOptions& options, con
     file.surface.triangles = trianglesOf(path, raw, sources);
     file.surface.points = std::move(raw.points);
     takeFields(raw, sources, file.surface);
-    if (raw.format == kStlFormat) joinCorners(file.surface, execution);
+    if (raw.format == kStlFormat) mergePoints(file.surface, execution);  // every triangle has its own
+    file.isOriented = raw.format != kPolyFormat;
+    file.polygons = std::move(sources);
     file.format = std::move(raw.format);
     file.holesWorld = std::move(raw.holesWorld);
     file.regions = std::move(raw.regions);

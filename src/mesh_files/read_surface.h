@@ -15,6 +15,9 @@ struct SurfaceFile {
     std::vector<Vec3d> holesWorld;  ///< places in holes
     std::vector<RegionSeed> regions;
     std::vector<std::string> warnings;  ///< one sentence each
+    /// Of every triangle the polygon of the file that it is part of, counted from 0.
+    std::vector<std::int64_t> polygons;
+    bool isOriented = true;  ///< triangles have an outside; TetGen's facets have none
 };
 
 /// Whether a file is one that tetrahedra have to be made of first, by its name: .stl, .ply, .obj, .off,

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "base/text.h"
 #include "mesh_files/read_tetgen.h"
@@ -66,7 +67,10 @@ void readFacet(NumberLines& lines, std::int64_t firstNode, RawSurface& raw) {
             loop.push_back(readIndex(lines, firstNode, raw.points.size()));
         }
     }
-    for (std::int64_t h = 0; h < holes; ++h) lines.next("a hole of a facet");  // the polygons tell as much
+    if (polygons > 1 && holes != polygons - 1)
+        lines.fail("a facet of " + std::to_string(polygons) + " polygons and " + std::to_string(holes) +
+                   " holes: only facets are read whose polygons but one are the rims of holes");
+    for (std::int64_t h = 0; h < holes; ++h) lines.next("a hole of a facet");  // the polygons tell where
     if (loops.size() == 1) {
         raw.corners.insert(raw.corners.end(), loops[0].begin(), loops[0].end());
         return raw.endPolygon();
@@ -89,7 +93,7 @@ void takeNodes(RawBlock nodes, RawSurface& raw) {
 RawSurface readOff(const NamedText& text) {
     RawSurface raw;
     raw.format = "OFF";
-    NumberLines lines(text);
+    NumberLines lines(text, kOnlyBlanks);
     lines.next("OFF");
     if (const std::string_view magic = lines.word(); lowerCase(magic) != "off")
         lines.fail("expected OFF, found '" + printable(magic.substr(0, 24)) +
@@ -117,7 +121,8 @@ RawSurface readObj(const NamedText& text) {
     RawSurface raw;
     raw.format = "Wavefront OBJ";
     Field color{"color", FieldLocation::point, 3, {}};
-    NumberLines lines(text);
+    bool hasCurves = false;
+    NumberLines lines(text, kOnlyBlanks);
     while (lines.tryNext()) {
         const std::string_view keyword = lines.word();
         if (keyword == "v") {
@@ -132,8 +137,12 @@ RawSurface readObj(const NamedText& text) {
             if (corners < 3 || corners > kMostCorners)
                 lines.fail("a face of " + std::to_string(corners) + " corners, expected 3 or more");
             raw.endPolygon();
+        } else {
+            hasCurves |= keyword == "l" || keyword == "curv" || keyword == "surf";
         }
     }
+    if (raw.ends.empty() && hasCurves)
+        throw InputError(text.name + ": holds lines or curves and no faces; only faces are read");
     if (raw.points.empty())
         throw InputError(text.name + ": isn't an .obj file with points: no line begins with v");
     if (color.values.size() == 3 * raw.points.size()) raw.fields.push_back(std::move(color));
@@ -153,7 +162,7 @@ RawSurface readNodePoints(const NamedText& text) {
 RawSurface readPoly(const NamedText& text, const std::string& nodesPath,
                     const std::function<std::string()>& readNodes) {
     RawSurface raw;
-    raw.format = "TetGen surface";
+    raw.format = kPolyFormat;
     NumberLines lines(text);
     RawBlock nodes;
     std::optional<std::int64_t> firstNode = readTetgenNodes(lines, nodes);
@@ -177,11 +186,16 @@ RawSurface readPoly(const NamedText& text, const std::string& nodesPath,
     }
     if (!lines.tryNext()) return raw;
     const std::int64_t regions = lines.readCount("number of regions", 8);
+    bool hasNumbers = false;
     for (std::int64_t r = 0; r < regions; ++r) {
         lines.next("a region");
         lines.read<std::int64_t>("a region's number");
         raw.regions.push_back({readPlace(lines), 0});
+        hasNumbers |= !lines.atEnd();
     }
+    if (hasNumbers)
+        raw.warnings.push_back(
+            "Attributes and largest volumes of regions are left out: regions count from 1.");
     return raw;
 }
 
@@ -235,6 +249,14 @@ std::optional<double> tableNumber(std::string_view word, char separator) {
     return value;
 }
 
+/// Of "v:2" the 2.
+std::optional<std::size_t> componentOf(const std::string& name) {
+    const std::size_t size = name.size();
+    if (size < 3 || name[size - 2] != ':' || name[size - 1] < '0' || name[size - 1] > '8')
+        return std::nullopt;
+    return std::size_t(name[size - 1] - '0');
+}
+
 class Table {
   public:
     explicit Table(const NamedText& text) : text_(text), rest_(text.bytes) {
@@ -247,6 +269,9 @@ class Table {
     void readHead();
     void readNames();
     void assignColumns();
+    bool isPlace(std::size_t column) const {
+        return std::find(place_.begin(), place_.end(), column) != place_.end();
+    }
     void readRow(RawSurface& raw);
     [[noreturn]] void fail(const std::string& why) const {
         throw InputError(text_.name + ": line " + std::to_string(lineNumber_) + ": " + why);
@@ -262,7 +287,8 @@ class Table {
     std::array<std::size_t, 3> place_{0, 1, 2};
     std::vector<Field> fields_;
     std::vector<std::vector<std::size_t>> columns_;  // of each field
-    bool hasRow_ = false;                            // the current line is one
+    std::string warning_;
+    bool hasRow_ = false;  // the current line is one
 };
 
 bool Table::nextLine() {
@@ -307,13 +333,19 @@ void Table::readHead() {
     if (!nextLine()) throw InputError(text_.name + ": holds no line of numbers");
     for (const char candidate : {';', '\t', ',', ' '}) {
         separator_ = candidate;
-        if (line_.find(candidate) != std::string_view::npos) break;
+        bool isQuoted = false, isFound = false;
+        for (const char c : line_) {
+            isQuoted ^= c == '"';
+            isFound |= !isQuoted && c == candidate;
+        }
+        if (isFound) break;
     }
     readNames();
 }
 
 /// The place of a point and the components of every field.
 void Table::assignColumns() {
+    bool isNamed = false;
     std::map<std::string, std::size_t> byName;
     for (std::size_t c = 0; c < names_.size(); ++c) byName.emplace(lowerCase(names_[c]), c);
     for (const std::array<const char*, 3>& called :
@@ -322,26 +354,50 @@ void Table::assignColumns() {
         if (!byName.contains(called[0]) || !byName.contains(called[1]) || !byName.contains(called[2]))
             continue;
         for (std::size_t k = 0; k < 3; ++k) place_[k] = byName.at(called[k]);
+        isNamed = true;
         break;
     }
-    std::map<std::string, std::size_t> known;
+    if (!isNamed && !hasRow_) {
+        const std::string first = "'" + names_[0] + "', '" + names_[1] + "' and '" + names_[2] + "'";
+        for (const char* one : {"x", "y", "z"})
+            if (byName.contains(one))
+                fail("a column is called " + std::string(one) + ", but not all of x, y and z are there");
+        for (int k = 0; k < 3; ++k)
+            if (const auto number = tableNumber(names_[std::size_t(k)], separator_);
+                number && !names_[std::size_t(k)].empty())
+                fail("neither names of columns nor numbers alone: begins with " +
+                     printable(names_[0].substr(0, 24)));
+        warning_ = "No columns are called x, y and z: " + first + " are taken for them.";
+    }
+    // Columns v:0, v:1, ... in any order are one field where none is missing.
+    std::map<std::string, std::map<std::size_t, std::size_t>> numbered;
+    std::set<std::string> whole;
+    for (std::size_t c = 0; c < names_.size(); ++c)
+        if (const auto number = componentOf(names_[c]); number && !isPlace(c))
+            numbered[names_[c].substr(0, names_[c].size() - 2)].emplace(*number, c);
+        else
+            whole.insert(names_[c]);
+    std::set<std::string> taken;
     for (std::size_t c = 0; c < names_.size(); ++c) {
-        if (std::find(place_.begin(), place_.end(), c) != place_.end()) continue;
-        std::string name = names_[c];
-        if (const std::size_t colon = name.rfind(':'); colon != std::string::npos && colon > 0 &&
-                                                       colon + 2 == name.size() && name[colon + 1] >= '0' &&
-                                                       name[colon + 1] <= '9')
-            name.resize(colon);
-        if (name.empty()) name = "column_" + std::to_string(c + 1);
-        const auto [at, isNew] = known.emplace(name, fields_.size());
-        const bool joins = !isNew && name != names_[c] && columns_[at->second].size() < 9;
-        if (!isNew && !joins) fail("two columns are called '" + printable(name.substr(0, 64)) + "'");
-        if (isNew) {
-            fields_.push_back({name, FieldLocation::point, 0, {}});
-            columns_.emplace_back();
+        if (isPlace(c)) continue;
+        std::string name = names_[c].empty() ? "column_" + std::to_string(c + 1) : names_[c];
+        std::vector<std::size_t> columns{c};
+        if (componentOf(name)) {
+            const std::string base = name.substr(0, name.size() - 2);
+            const auto& parts = numbered.at(base);
+            if (parts.rbegin()->first + 1 == parts.size() && !whole.contains(base)) {
+                if (parts.at(*componentOf(name)) != c)
+                    fail("two columns are called '" + printable(name.substr(0, 64)) + "'");
+                if (taken.contains(base)) continue;
+                name = base;
+                columns.clear();
+                for (const auto& [number, column] : parts) columns.push_back(column);
+            }
         }
-        columns_[at->second].push_back(c);
-        ++fields_[at->second].components;
+        if (!taken.insert(name).second)
+            fail("two columns are called '" + printable(name.substr(0, 64)) + "'");
+        fields_.push_back({name, FieldLocation::point, int(columns.size()), {}});
+        columns_.push_back(std::move(columns));
     }
 }
 
@@ -374,6 +430,7 @@ RawSurface Table::read() {
     if (hasRow_) readRow(raw);
     while (nextLine()) readRow(raw);
     raw.fields = std::move(fields_);
+    if (!warning_.empty()) raw.warnings.push_back(warning_);
     return raw;
 }
 

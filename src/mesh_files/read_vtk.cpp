@@ -285,7 +285,7 @@ RawSurface readPolygons(const std::string& path, VtkFormat format, const ReadOpt
         [&](vtkDataObject* data, const VtkSource&) { raw = surfaceOf(path, data, options, execution); },
         statistics, unread);
     raw.format = statistics.format;
-    raw.warnings = std::move(statistics.warnings);
+    raw.warnings.insert(raw.warnings.end(), statistics.warnings.begin(), statistics.warnings.end());
     return raw;
 }
 

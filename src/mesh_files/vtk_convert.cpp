@@ -491,8 +491,8 @@ void appendDataSet(const std::string& path, vtkDataSet* data, const std::string&
 }
 
 /// Corners of a 2D cell in order; none for other cells.
-void appendPolygon(int type, std::span<const vtkIdType> nodes, RawSurface& raw, std::int64_t cell,
-                   std::vector<std::int64_t>& sources) {
+void appendPolygon(const std::string& path, int type, std::span<const vtkIdType> nodes, RawSurface& raw,
+                   std::int64_t cell, std::vector<std::int64_t>& sources) {
     const auto add = [&](std::initializer_list<std::size_t> order) {
         for (const std::size_t i : order) raw.corners.push_back(std::int32_t(nodes[i]));
         raw.endPolygon();
@@ -520,8 +520,15 @@ void appendPolygon(int type, std::span<const vtkIdType> nodes, RawSurface& raw, 
             for (std::size_t i = 2; i < nodes.size(); ++i)
                 i % 2 == 0 ? add({i - 2, i - 1, i}) : add({i - 1, i - 2, i});
             break;
-        default:
+        case VTK_EMPTY_CELL:
+        case VTK_VERTEX:
+        case VTK_POLY_VERTEX:
+        case VTK_LINE:
+        case VTK_POLY_LINE:
             break;
+        default:
+            throw InputError(path + ": cell " + std::to_string(cell) + " is of VTK's type " +
+                             std::to_string(type) + ", which isn't read as part of a surface");
     }
 }
 
@@ -553,6 +560,7 @@ RawSurface surfaceOf(const std::string& path, vtkDataObject* data, const ReadOpt
     const Ghosts ghosts = ghostsOf(set);
     std::vector<std::int64_t> sources;  // the cell of every polygon
     bool hasLines = false;
+    std::int64_t higherOrder = 0;
     vtkNew<vtkIdList> nodes;
     for (vtkIdType c = 0; c < set->GetNumberOfCells(); ++c) {
         const int type = set->GetCellType(c);
@@ -566,12 +574,18 @@ RawSurface surfaceOf(const std::string& path, vtkDataObject* data, const ReadOpt
                 throw InputError(path + ": cell " + std::to_string(c) + " names node " +
                                  std::to_string(node) + ", out of range 0 to " +
                                  std::to_string(std::int64_t(raw.points.size()) - 1));
-        if (!ghosts.hidesCell(c)) appendPolygon(type, ids, raw, c, sources);
+        if (!ghosts.hidesCell(c)) appendPolygon(path, type, ids, raw, c, sources);
+        higherOrder += type == VTK_QUADRATIC_TRIANGLE || type == VTK_QUADRATIC_QUAD;
         hasLines |= type == VTK_LINE || type == VTK_POLY_LINE;
     }
     if (raw.polygonCount() == 0 && hasLines)
         throw InputError(path +
                          ": holds lines and no triangles; tetrahedra are made of closed surfaces or points");
+    if (higherOrder > 0)
+        raw.warnings.push_back(std::to_string(higherOrder) +
+                               " cells of higher order are read by their corners, as flat ones.");
+    if (raw.polygonCount() == 0 && set->GetCellData()->GetNumberOfArrays() > 0)
+        raw.warnings.push_back("Fields of cells are left out: there are no triangles.");
     RawBlock block;
     copyFields(path, set->GetPointData(), FieldLocation::point, set->GetNumberOfPoints(), options, execution,
                block);

@@ -110,8 +110,9 @@ ReportStart IsolatedReading::start() const {
 }
 
 std::string IsolatedReading::suspicion() const {
-    return makesTetrahedra() ? "; its input hits a bug of that library"
-                             : "; the file is damaged, or hits a bug of the library that reads it";
+    return makesTetrahedra()
+               ? "; its input hits a bug of that library, as parts that lie closer than 1e-8 of its size do"
+               : "; the file is damaged, or hits a bug of the library that reads it";
 }
 
 void IsolatedReading::failWithGarbage(const std::string& why) const {

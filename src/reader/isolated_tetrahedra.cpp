@@ -82,6 +82,10 @@ const IsolatedReader& requireTetrahedralizer(const std::optional<IsolatedReader>
 MeshFile tetrahedralizeIsolated(const IsolatedReader& program, const std::string& path,
                                 const ReadOptions& read, const TetrahedralizeOptions& options,
                                 const IsolationLimits& limits, const Execution& execution) {
+    if (!read.otherParts.empty())
+        throw InputError(path +
+                         ": a surface or points, and one of several parts of a mesh; tetrahedra are made of "
+                         "a single file");
     ReaderRequest request;
     request.path = path;
     request.options = read;

@@ -124,8 +124,12 @@ SurfaceShells measureShells(const TriangleTree& tree, SurfaceParts found,
     FaultCounter inverted(SurfaceFault::inverted);
     for (std::size_t s = 0; s < volumes.size(); ++s) {
         const SurfacePart& part = found.parts[s];
+        std::int32_t parent = -1;
+        for (const std::int32_t other : around[s])
+            if (parent < 0 || around[std::size_t(other)].size() > around[std::size_t(parent)].size())
+                parent = other;
         measured.shells.push_back(
-            {part.firstTriangle, part.triangles, volumes[s], int(around[s].size()), Vec3d(0)});
+            {part.firstTriangle, part.triangles, volumes[s], int(around[s].size()), parent, Vec3d(0)});
         if (!around[s].empty() || volumes[s] > 0) continue;
         inverted.count();
         inverted.involve(std::int32_t(part.firstTriangle),
@@ -213,8 +217,9 @@ std::string repairHint(const std::vector<SurfaceFinding>& findings, const Surfac
         return "; " + std::to_string(coincident) +
                (coincident == 1 ? " point lies at the same place as another"
                                 : " points lie at the same place as others") +
-               ": --repair-surface merges them";
-    return removesOrTurns ? "; --repair-surface merges points and turns triangles" : "";
+               ": tessera-tetrahedralize --repair-surface merges them";
+    return removesOrTurns ? "; tessera-tetrahedralize --repair-surface merges points and turns triangles"
+                          : "";
 }
 
 std::string triangleNames(const std::vector<std::int64_t>& triangles) {

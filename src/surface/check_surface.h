@@ -36,8 +36,9 @@ struct SurfaceFinding {
 struct SurfaceShells {
     struct Shell {
         std::int64_t firstTriangle = 0, triangles = 0;
-        double volumeWorld = 0;  ///< below 0: it looks inwards, and bounds a cavity
-        int around = 0;          ///< how many shells it lies in
+        double volumeWorld = 0;    ///< below 0: it looks inwards, and bounds a cavity
+        int around = 0;            ///< how many shells it lies in
+        std::int32_t parent = -1;  ///< the innermost of them
         /// A place in it, off all triangles and outside of the shells in it; on it where it is so thin that
         /// no double lies in it.
         Vec3d insideWorld{0};

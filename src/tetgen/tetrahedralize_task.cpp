@@ -3,20 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <map>
 #include <optional>
 
 #include "base/machine_memory.h"
 #include "base/text.h"
 #include "base/timer.h"
-#include "mesh/mesh_quality.h"
 #include "mesh/triangle_distance.h"
 #include "mesh_files/assemble_mesh.h"
 #include "mesh_files/read_surface.h"
 #include "reader/isolated_tetrahedra.h"
 #include "reader/mesh_packet.h"
 #include "surface/check_surface.h"
+#include "surface/exact_normal.h"
 #include "surface/extend_fields.h"
-#include "surface/winding_number.h"
+#include "surface/shell_of_place.h"
 #include "tessera/error.h"
 #include "tetgen/run_tetgen.h"
 
@@ -54,39 +56,11 @@ void keepPoints(const std::vector<char>& isKept, Surface& surface, std::vector<s
     surface.points.resize(std::size_t(kept));
 }
 
-/// Mean values of points that lie at one place, which only the first of them keeps.
-std::int64_t mergePoints(Surface& points, const Execution& execution) {
-    const std::vector<std::int32_t> first = firstNodeAtPlace(points.points, execution);
-    std::vector<char> isKept(first.size());
-    std::vector<std::int32_t> counts(first.size());
-    for (std::size_t p = 0; p < first.size(); ++p) {
-        isKept[p] = std::size_t(first[p]) == p;
-        ++counts[std::size_t(first[p])];
-    }
-    const auto merged = std::count(isKept.begin(), isKept.end(), 0);
-    if (merged == 0) return 0;
-    for (Field& field : points.fields) {
-        const auto components = std::size_t(field.components);
-        for (std::size_t c = 0; c < components; ++c) {
-            const auto at = [&](std::size_t p) -> double& { return field.values[p * components + c]; };
-            // Differences from the first: equal values stay as they are, bit for bit.
-            std::vector<double> differences(first.size());
-            for (std::size_t p = 0; p < first.size(); ++p)
-                differences[std::size_t(first[p])] += at(p) - at(std::size_t(first[p]));
-            for (std::size_t p = 0; p < first.size(); ++p)
-                if (counts[p] > 1) at(p) += differences[p] / counts[p];
-        }
-    }
-    std::vector<std::int32_t> number;
-    keepPoints(isKept, points, number);
-    return merged;
-}
-
 /// Throws InputError where no four points span a volume. Merged points differ, so the largest isn't 0.
 void checkSpan(const std::string& path, const std::vector<Vec3d>& points) {
     const std::string need = "; tetrahedra need 4 points that don't lie in one plane";
     if (points.size() < 4)
-        throw InputError(path + ": holds " + counted(std::int64_t(points.size()), "point") + need);
+        throw InputError(path + ": holds " + counted(std::int64_t(points.size()), "different point") + need);
     // Coordinates of at most 1, so that nothing overflows.
     double largest = 0;
     for (const Vec3d& p : points) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -105,8 +79,7 @@ void checkSpan(const std::string& path, const std::vector<Vec3d>& points) {
     const Vec3d normal = glm::normalize(glm::cross(along, side - origin));
     const auto [depth, top] =
         furthest([&](const Vec3d& p) { return std::abs(glm::dot(normal, p - origin)); });
-    if (depth * width < kRounding * length)
-        throw InputError(path + ": all points lie in one plane, but for rounding" + need);
+    if (depth < kRounding) throw InputError(path + ": all points lie in one plane, but for rounding" + need);
 }
 
 /// Drops elements with an edge above the limit.
@@ -134,6 +107,8 @@ class Tetrahedralization {
   private:
     void readFile();
     void takeSeeds();
+    void takeCavities();
+    void warnOfLargeTriangles(const SizeField& size, const TetgenOutput& mesh);
     void checkSurface();
     TetgenOutput ofPoints();
     TetgenOutput ofSurface();
@@ -141,6 +116,7 @@ class Tetrahedralization {
     RawBlock blockOf(TetgenOutput mesh);
     void carryFields(const TetgenOutput& mesh, TetMesh& carried) const;
     void note(const std::string& sentence) { notes_.push_back(sentence); }
+    void warn(const std::string& sentence) { file_.warnings.push_back(sentence); }
     /// Errors name the file.
     template <class Work>
     auto ofThisFile(const Work& work) const {
@@ -158,6 +134,7 @@ class Tetrahedralization {
     SurfaceFile file_;
     Surface& surface_ = file_.surface;
     SurfaceShells shells_;
+    std::vector<char> isKept_;  // of every shell the part right within it
     std::vector<std::string> notes_;
 };
 
@@ -172,24 +149,46 @@ void Tetrahedralization::readFile() {
          ".");
 }
 
-/// Those of the options and of the file; each must lie in the volume.
+/// Those of the options and of the file: each in a part of the volume of its own. Shells that look inwards
+/// are holes.
 void Tetrahedralization::takeSeeds() {
     auto& holes = options_.holesWorld;
     holes.insert(holes.end(), file_.holesWorld.begin(), file_.holesWorld.end());
     auto& regions = options_.regions;
     regions.insert(regions.end(), file_.regions.begin(), file_.regions.end());
-    const auto check = [&](const char* what, const Vec3d& place) {
-        if (!(windingNumber(surface_, place) > 0.5))
-            throw InputError(path_ + ": the " + what + " at " + placeText(place) +
-                             " lies outside of the volume that the surface bounds");
+    isKept_.assign(shells_.shells.size(), 1);
+    takeCavities();
+    const auto shellAt = [&](const std::string& what, const Vec3d& place) {
+        const ShellOfPlace found = findShell(surface_, shells_, place);
+        if (found.isOnSurface) throw InputError(path_ + ": " + what + " lies on the surface");
+        if (found.shell < 0) throw InputError(path_ + ": " + what + " lies outside of the surface");
+        return std::size_t(found.shell);
     };
-    for (const Vec3d& hole : holes) check("hole", hole);
-    for (const RegionSeed& seed : regions) check("region", seed.placeWorld);
+    for (const Vec3d& hole : holes) isKept_[shellAt("the hole at " + placeText(hole), hole)] = 0;
+    std::map<std::size_t, std::string> named;
+    for (const RegionSeed& seed : regions) {
+        const std::string what = "the region at " + placeText(seed.placeWorld);
+        const std::size_t shell = shellAt(what, seed.placeWorld);
+        if (!isKept_[shell]) throw InputError(path_ + ": " + what + " lies in a hole");
+        const auto [other, isFirst] = named.emplace(shell, what);
+        if (!isFirst) throw InputError(path_ + ": " + what + " lies in the same part as " + other->second);
+    }
+    for (std::size_t s = 0; s < isKept_.size(); ++s)
+        if (shells_.shells[s].volumeWorld < 0) holes.push_back(shells_.shells[s].insideWorld);
+    if (std::find(isKept_.begin(), isKept_.end(), 1) == isKept_.end())
+        throw InputError(path_ + ": the holes leave nothing of the volume");
+}
+
+void Tetrahedralization::takeCavities() {
     std::int64_t cavities = 0;
-    for (const auto& shell : shells_.shells) {
+    for (std::size_t s = 0; s < isKept_.size(); ++s) {
+        const SurfaceShells::Shell& shell = shells_.shells[s];
         if (shell.volumeWorld >= 0) continue;
+        if (shells_.shells[std::size_t(shell.parent)].volumeWorld < 0)
+            throw InputError(path_ + ": the part of the surface around " + placeText(shell.insideWorld) +
+                             " looks inwards, and so does the one that it lies in: a hole in a hole");
+        isKept_[s] = 0;
         ++cavities;
-        holes.push_back(shell.insideWorld);
     }
     if (cavities > 0)
         note(counted(cavities, "part") + " of the surface inside others " +
@@ -199,13 +198,20 @@ void Tetrahedralization::takeSeeds() {
 
 void Tetrahedralization::checkSurface() {
     if (options_.repairs) {
-        const SurfaceRepair repair = repairSurface(surface_, execution_);
+        const SurfaceRepair repair = ofThisFile([&] { return repairSurface(surface_, execution_); });
         note("Repair of the surface: " + counted(repair.mergedPoints, "point") + " merged, " +
              counted(repair.removedTriangles, "triangle") + " removed, " +
              counted(repair.turnedTriangles, "triangle") + " turned.");
+        if (surface_.triangles.empty())
+            throw InputError(path_ + ": the repair leaves no triangle: none spans an area");
+    } else if (!file_.isOriented) {
+        ofThisFile([&] { return turnTriangles(surface_, Outwards::all, execution_); });
     }
-    const std::vector<SurfaceFinding> findings =
+    std::vector<SurfaceFinding> findings =
         ofThisFile([&] { return findSurfaceFaults(surface_, execution_, &shells_); });
+    if (!options_.repairs)  // which renumbers them
+        for (SurfaceFinding& finding : findings)
+            for (std::int64_t& triangle : finding.triangles) triangle = file_.polygons[std::size_t(triangle)];
     if (!findings.empty()) throw InputError(path_ + ": " + faultSentence(findings, surface_));
     std::vector<char> isUsed(surface_.points.size());
     for (const auto& triangle : surface_.triangles)
@@ -220,8 +226,13 @@ void Tetrahedralization::checkSurface() {
 }
 
 TetgenOutput Tetrahedralization::ofPoints() {
+    if (options_.size.any() || options_.splitsBoundary || options_.repairs || !options_.holesWorld.empty() ||
+        !options_.regions.empty())
+        throw InputError(path_ +
+                         ": holds points and no triangles; sizes, --boundary, --hole, --region and "
+                         "--repair-surface are for surfaces");
     if (const std::int64_t merged = mergePoints(surface_, execution_); merged > 0)
-        note(counted(merged, "point") +
+        warn(counted(merged, "point") +
              " at the same place as others merged with them, values to their means.");
     checkSpan(path_, surface_.points);
     reportStage(Stage::tetrahedralizing);
@@ -230,7 +241,7 @@ TetgenOutput Tetrahedralization::ofPoints() {
     TetgenOutput mesh = ofThisFile([&] { return runTetgen(input); });
     if (options_.hullLimitWorld > 0) {
         const std::int64_t dropped = dropLongElements(options_.hullLimitWorld, mesh);
-        note(counted(dropped, "tetrahedron") + " with an edge above " + shortNumber(options_.hullLimitWorld) +
+        note(counted(dropped, "element") + " with an edge above " + shortNumber(options_.hullLimitWorld) +
              " left out (--hull-limit).");
         if (mesh.tets.empty())
             throw InputError(path_ + ": --hull-limit " + shortNumber(options_.hullLimitWorld) +
@@ -239,10 +250,16 @@ TetgenOutput Tetrahedralization::ofPoints() {
     return mesh;
 }
 
-/// Where no holes were asked for every triangle is a face of the mesh, or split into such.
+/// Every triangle beside a part that isn't a hole is a face of the mesh, or split into such.
 void Tetrahedralization::checkTriangles(const TetgenOutput& mesh) const {
     std::vector<char> isThere(surface_.triangles.size());
     for (const TetgenOutput::Face& face : mesh.faces) isThere[std::size_t(face.triangle)] = 1;
+    for (std::size_t t = 0; t < isThere.size(); ++t) {
+        const auto shell = std::size_t(shells_.shellOf[t]);
+        const std::int32_t parent = shells_.shells[shell].parent;
+        if (!isKept_[shell] && (parent < 0 || !isKept_[std::size_t(parent)]))
+            isThere[t] = 1;  // and needn't be
+    }
     const auto lost = std::count(isThere.begin(), isThere.end(), 0);
     if (lost == 0) return;
     const auto first = std::find(isThere.begin(), isThere.end(), 0) - isThere.begin();
@@ -252,9 +269,29 @@ void Tetrahedralization::checkTriangles(const TetgenOutput& mesh) const {
                      ": it takes points for one that are closer than about 1e-8 of the surface's size");
 }
 
+/// Elements at triangles that stay as they are get no smaller than these.
+void Tetrahedralization::warnOfLargeTriangles(const SizeField& size, const TetgenOutput& mesh) {
+    constexpr double kLarge = 2;
+    std::int64_t large = 0;
+    for (const TetgenOutput::Face& face : mesh.faces) {
+        double longest = 0, wish = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < 3; ++i) {
+            const Vec3d& a = mesh.points[std::size_t(face.nodes[i])];
+            longest = std::max(longest, glm::distance(a, mesh.points[std::size_t(face.nodes[(i + 1) % 3])]));
+            wish = std::min(wish, size.at(a));
+        }
+        large += longest > kLarge * wish;
+    }
+    if (large > 0)
+        warn(counted(large, "triangle") + " of the surface " + (large == 1 ? "has" : "have") +
+             " edges of more than twice the length wished for, and so have the elements there; "
+             "--boundary refine splits them.");
+}
+
 TetgenOutput Tetrahedralization::ofSurface() {
+    if (options_.hullLimitWorld > 0)
+        throw InputError(path_ + ": holds a surface; --hull-limit is for scattered points");
     checkSurface();
-    const bool hasHoles = !options_.holesWorld.empty() || !file_.holesWorld.empty();
     takeSeeds();
     std::optional<SizeField> size;
     if (options_.size.any()) ofThisFile([&] { return &size.emplace(surface_, options_.size, execution_); });
@@ -269,8 +306,8 @@ TetgenOutput Tetrahedralization::ofSurface() {
     input.splitsBoundary = options_.splitsBoundary;
     input.size = size ? &*size : nullptr;
     TetgenOutput mesh = ofThisFile([&] { return runTetgen(input); });
-    if (mesh.tets.empty()) throw InputError(path_ + ": the holes leave nothing of the volume");
-    if (!hasHoles) checkTriangles(mesh);
+    checkTriangles(mesh);
+    if (size && !options_.splitsBoundary) warnOfLargeTriangles(*size, mesh);
     note("TetGen added " + counted(std::int64_t(mesh.points.size() - surface_.points.size()), "point") + ".");
     return mesh;
 }
@@ -285,8 +322,7 @@ void Tetrahedralization::carryFields(const TetgenOutput& mesh, TetMesh& carried)
     }
     for (const TetgenOutput::Face& face : mesh.faces) {
         const auto& triangle = surface_.triangles[std::size_t(face.triangle)];
-        std::array<Vec3d, 3> corners;
-        for (std::size_t i = 0; i < 3; ++i) corners[i] = surface_.points[std::size_t(triangle[i])];
+        const TriangleCorners corners = cornersOf(surface_, face.triangle);
         for (const std::int32_t node : face.nodes) {
             if (isKnown[std::size_t(node)]) continue;
             isKnown[std::size_t(node)] = 1;
@@ -306,9 +342,11 @@ void Tetrahedralization::carryFields(const TetgenOutput& mesh, TetMesh& carried)
 }
 
 RawBlock Tetrahedralization::blockOf(TetgenOutput mesh) {
+    RawBlock block;
+    for (const Field& field : surface_.fields)  // messages list all
+        block.arrays.push_back({field.name, FieldLocation::point, field.components, true});
     std::erase_if(surface_.fields,
                   [&](const Field& field) { return !isWanted(read_, field.name, field.location); });
-    RawBlock block;
     if (surface_.triangles.empty()) {
         block.fields = std::move(surface_.fields);
     } else {
@@ -318,12 +356,13 @@ RawBlock Tetrahedralization::blockOf(TetgenOutput mesh) {
     }
     block.points = std::move(mesh.points);
     if (!mesh.regions.empty() && *std::max_element(mesh.regions.begin(), mesh.regions.end()) >
-                                     *std::min_element(mesh.regions.begin(), mesh.regions.end()))
+                                     *std::min_element(mesh.regions.begin(), mesh.regions.end())) {
         block.fields.push_back({"region", FieldLocation::cell, 1, std::move(mesh.regions)});
+        block.arrays.push_back({"region", FieldLocation::cell, 1, true});
+        if (!read_.fields.empty()) read_.fields.push_back("region");
+    }
     block.tets = std::move(mesh.tets);
     block.sourceCells = std::int64_t(block.tets.size());
-    for (const Field& field : block.fields)
-        block.arrays.push_back({field.name, field.location, field.components, true});
     return block;
 }
 
@@ -338,7 +377,7 @@ MeshFile Tetrahedralization::run() {
     const std::int64_t points = std::int64_t(raw.blocks[0].points.size());
     MeshFile file = assembleMesh(path_, std::move(raw), read_, execution_);
     if (const std::int64_t lost = points - file.mesh.nodeCount(); lost > 0)
-        file.statistics.notes.push_back(
+        file.statistics.warnings.push_back(
             counted(lost, "point") + " of no tetrahedron left out" +
             (options_.hullLimitWorld > 0 || !arePoints ? "." : ": too close to others for TetGen."));
     file.readPeakBytes = peakMemoryBytes();

@@ -120,6 +120,13 @@ TEST_F(ReadSurface, ReadsTablesOfAnyKind) {
     EXPECT_TRUE(std::isnan(vector[0].values[2]));
     EXPECT_EQ(expectPoints("# made by hand\n# x y z T\n1 2 3 7\n4 5 6.5 NA\n")[0].name, "T");
     EXPECT_EQ(expectPoints("x;y;z;T\n1,0;2;3;7,5\n4;5;6,5;8\n")[0].values, (std::vector<double>{7.5, 8}));
+    EXPECT_EQ(expectPoints("x,y,z,v:1,v:0\n1,2,3,8,7\n4,5,6.5,10,9\n")[0].values,
+              (std::vector<double>{7, 8, 9, 10}));
+    EXPECT_EQ(expectPoints("x,y,z,v:0,v:2\n1,2,3,8,7\n4,5,6.5,10,9\n").size(), 2u);  // one is missing
+    EXPECT_EQ(expectPoints("\"x\",\"y\",\"z\",\"temp; mean\"\n1,2,3,7\n4,5,6.5,8\n")[0].name, "temp; mean");
+    EXPECT_EQ(read("n.csv", "lon,lat,depth\n1,2,3\n").warnings.size(), 1u);
+    EXPECT_NE(refusal("o.csv", "x,y,T\n1,2,3\n").find("not all of x, y and z"), std::string::npos);
+    EXPECT_NE(refusal("p.csv", "0,0,0,none\n1,2,3,4\n").find("neither names"), std::string::npos);
     EXPECT_EQ(refusal("b.csv", "x,y,z\n1,2,3\n1,2\n"), "line 3: has 2 of 3 columns");
     EXPECT_EQ(refusal("c.csv", "x,y,z\n1,2,wide\n"), "line 2: expected a number, found 'wide'");
     EXPECT_EQ(refusal("d.csv", "x,y,z,T,T\n1,2,3,4,5\n"), "line 1: two columns are called 'T'");

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "reference/generators.h"
+#include "surface/shell_of_place.h"
 #include "surface/size_field.h"
-#include "surface/winding_number.h"
 #include "tessera/error.h"
 
 namespace tessera {
@@ -145,15 +145,22 @@ TEST(CurvatureRadii, AreThoseOfASphere) {
         EXPECT_NEAR(radii[std::size_t(at(kRings / 2, s))], kRadius, 0.02 * kRadius);
 }
 
-TEST(WindingNumber, CountsHowOftenASurfaceRunsAround) {
+TEST(ShellOfPlace, IsTheInnermost) {
     Surface two;  // a tetrahedron in another one, the inner one turned inwards
     for (const double size : {8.0, 1.0})
         for (const Vec3d& p : {Vec3d(0, 0, 0), Vec3d(1, 0, 0), Vec3d(0, 1, 0), Vec3d(0, 0, 1)})
             two.points.push_back(size * (p - 0.25));
     two.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}, {4, 5, 6}, {4, 7, 5}, {4, 6, 7}, {5, 7, 6}};
-    EXPECT_NEAR(windingNumber(two, {-1, -1, -1}), 1, 1e-12);
-    EXPECT_NEAR(windingNumber(two, {0, 0, 0}), 0, 1e-12);
-    EXPECT_NEAR(windingNumber(two, {9, 0, 0}), 0, 1e-12);
+    SurfaceShells shells;
+    ASSERT_TRUE(findSurfaceFaults(two, {}, &shells).empty());
+    ASSERT_EQ(shells.shells.size(), 2u);
+    EXPECT_EQ(shells.shells[0].parent, -1);
+    EXPECT_EQ(shells.shells[1].parent, 0);
+    EXPECT_EQ(findShell(two, shells, {-1, -1, -1}).shell, 0);
+    EXPECT_EQ(findShell(two, shells, {0, 0, 0}).shell, 1);
+    EXPECT_EQ(findShell(two, shells, {9, 0, 0}).shell, -1);
+    EXPECT_FALSE(findShell(two, shells, {9, 0, 0}).isOnSurface);
+    EXPECT_TRUE(findShell(two, shells, {-0.25, 0, 0}).isOnSurface);
 }
 
 }  // namespace

@@ -241,6 +241,66 @@ class Good(TetrahedralizeTest):
                 self.assert_close(self.volume(self.write("box" + suffix, surfaces.Surface(points, quads))), 6)
 
 
+def nest(inwards):
+    """Boxes of 8, 6, 4 and 2 around the origin, the inner ones turned inwards where that is said, and the volumes of the parts between."""
+    boxes = [surfaces.box((-h,) * 3, (h,) * 3, 2) for h in (4, 3, 2, 1)]
+    volumes = [512 - 216, 216 - 64, 64 - 8, 8]
+    return surfaces.joined(*(surfaces.turned_over(b) if i in inwards else b for i, b in enumerate(boxes))), volumes
+
+
+class Parts(TetrahedralizeTest):
+    """Shells within shells, with holes and regions by places."""
+
+    PLACES = ["3.5,0.1,0.2", "0.3,-2.4,0.1", "0.2,0.3,1.4", "0.1,0.2,-0.3"]  # one in each part
+
+    def test_any_parts_may_be_holes(self):
+        random = np.random.default_rng(3)
+        for trial in range(12):
+            inwards = {int(random.integers(1, 4))} if trial % 3 else set()
+            holes = {int(i) for i in random.permutation(4)[: random.integers(0, 3)]}
+            surface, volumes = nest(inwards)
+            self.write("nest.off", surface)
+            options = [word for i in sorted(holes) for word in ("--hole", self.PLACES[i])]
+            kept = [v for i, v in enumerate(volumes) if i not in holes | inwards]
+            named = [i for i in range(4) if i not in holes | inwards][:2]
+            options += [word for i in named for word in ("--region", self.PLACES[i])]
+            if not kept:
+                continue
+            mesh, found = self.mesh("nest.off", *options, may_touch=True)
+            self.assert_close(found["volume"], sum(kept))
+            if len(kept) > 1:
+                by_region = [np.abs(mesh.volumes()[mesh.cell_fields["region"] == r + 1]).sum() for r in range(len(named))]
+                for value, i in zip(by_region, named):
+                    self.assert_close(value, volumes[i])
+
+    def test_places_that_contradict_are_refused(self):
+        self.write("nest.off", nest({2})[0])
+        for words, options in (
+            ("same part", ["--region", self.PLACES[0], "--region", "3.4,1,1"]),
+            ("on the surface", ["--region", "4,0.2,0.1"]),
+            ("on the surface", ["--hole", "4,4,4"]),
+            ("lies in a hole", ["--region", self.PLACES[2]]),
+            ("lies in a hole", ["--hole", self.PLACES[0], "--region", self.PLACES[0]]),
+            ("outside", ["--hole", "9,0,0"]),
+        ):
+            self.assertIn(words, self.reject("nest.off", "-o", "out.vtu", *options))
+        self.write("twice.off", nest({1, 2})[0])
+        self.assertIn("a hole in a hole", self.reject("twice.off", "-o", "out.vtu"))
+
+    def test_options_for_the_other_kind_are_refused(self):
+        self.write("nest.off", nest(set())[0])
+        (self.folder / "points.csv").write_text("x,y,z\n0,0,0\n1,0,0\n0,1,0\n0,0,1\n")
+        self.assertIn("--hull-limit", self.reject("nest.off", "-o", "out.vtu", "--hull-limit", "1"))
+        for options in (["--size", "1"], ["--hole", "0,0,0"], ["--repair-surface"], ["--boundary", "refine"]):
+            self.assertIn("points", self.reject("points.csv", "-o", "out.vtu", *options))
+
+    def test_large_triangles_that_stay_are_told(self):
+        self.write("box.off", surfaces.box())
+        kept = self.succeed("box.off", "-o", "out.vtu", "--size", "0.1")
+        self.assertIn("--boundary refine", kept)
+        self.assertNotIn("warning", self.succeed("box.off", "-o", "out.vtu", "--size", "0.1", "--boundary", "refine"))
+
+
 class Fields(TetrahedralizeTest):
     def test_a_linear_field_stays_linear(self):
         surface = surfaces.with_fields(surfaces.torus(24, 10))
