@@ -86,11 +86,15 @@ void addShapeOptions(CLI::App& app, Arguments& a) {
     app.add_option("--hole", a.holes,
                    "a place x,y,z in a part of the volume that stays empty; may be repeated. Parts of the "
                    "surface that lie inside others and look inwards are holes by themselves")
+        ->type_size(1)
+        ->allow_extra_args(false)
         ->group(group);
     app.add_option(
            "--region", a.regions,
            "a place x,y,z in a part of the volume that inner surfaces bound, with a length of edges if "
            "wanted (x,y,z:size); may be repeated. The cell field 'region' numbers them from 1")
+        ->type_size(1)
+        ->allow_extra_args(false)
         ->group(group);
     app.add_option("--hull-limit", o.hullLimitWorld,
                    "scattered points: tetrahedra with a longer edge are left out, so that bays stay empty")

@@ -192,6 +192,10 @@ class Good(TetrahedralizeTest):
         surface = surfaces.nested_spheres("inwards", 2)
         self.assert_close(self.volume(self.write("cavity.ply", surface)), surfaces.volume(surface))
 
+    def test_places_stand_before_the_file_too(self):
+        self.write("nested.ply", surfaces.nested_spheres("outwards", 2))
+        self.succeed("--hole", "0,0,0", "--region", "-0.75,0,0", "nested.ply", "-o", "out.vtu")
+
     def test_a_cavity_by_a_place(self):
         expected = surfaces.volume(surfaces.nested_spheres("inwards", 2))
         self.assert_close(self.volume(self.write("nested.ply", surfaces.nested_spheres("outwards", 2)), "--hole", "0,0,0"), expected)
