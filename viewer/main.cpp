@@ -27,13 +27,6 @@ void printError(const char* message) {
     std::fputs(("tessera: " + tessera::messageLine(message) + "\n").c_str(), stderr);
 }
 
-/// The tessera program that this one is installed with; empty where there is none.
-std::string programBeside() {
-    std::error_code error;
-    const auto candidate = std::filesystem::canonical("/proc/self/exe", error).parent_path() / "tessera";
-    return !error && std::filesystem::is_regular_file(candidate, error) ? candidate.string() : std::string();
-}
-
 /// How the display's driver crashed or stalled in a process that tried it; empty where it didn't.
 std::string windowFault() {
     using namespace tessera;
@@ -85,7 +78,7 @@ int view(int argc, char** argv) {
     }
     Job job;
     job.execution.threads = threads;
-    if (program.empty()) program = programBeside();
+    if (program.empty()) program = programBeside("/proc/self/exe", "tessera");
     if (!program.empty()) {
         const std::string quick = quickReaderBeside(program);
         job.reader = {program, {"read-mesh"}, quick};

@@ -16,8 +16,6 @@ namespace tessera {
 
 namespace {
 
-constexpr double kLeastLength = 1e-300, kLargestLength = 1e300;
-
 CLI::Option* addTimeStep(CLI::App& command, int& step) {
     return command
         .add_option(
@@ -514,7 +512,7 @@ void addFocusTraceOptions(CLI::App& command, FocusTraceArguments& a) {
                     "distance from the focus up to which spacing is the finest; beyond, it grows in "
                     "proportion to the distance")
         ->required()
-        ->check(numbersWithin(kLeastLength, kLargestLength))
+        ->check(isLength())
         ->group(where);
     auto* resolution =
         command
@@ -523,7 +521,7 @@ void addFocusTraceOptions(CLI::App& command, FocusTraceArguments& a) {
             ->check(CLI::Range(2, 1 << 20))
             ->group(where);
     command.add_option("--spacing", r.spacingWorld, "spacing of the finest level, in world units")
-        ->check(numbersWithin(kLeastLength, kLargestLength))
+        ->check(isLength())
         ->excludes(resolution)
         ->group(where);
     command.add_option("--brick-size", r.brickCells, "cells along a brick's edge: 8, 16, 32 or 64")

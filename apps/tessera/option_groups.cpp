@@ -43,6 +43,10 @@ CLI::Validator numbersWithin(double first, double last) {
     return {check, fmt::format("in [{:g} - {:g}]", first, last), ""};
 }
 
+CLI::Validator isLength() {
+    return numbersWithin(1e-300, 1e300);
+}
+
 void addRunOptions(CLI::App& command, CommonOptions& options) {
     command
         .add_option("--threads", options.threads,

@@ -11,6 +11,9 @@ namespace tessera {
 /// Numbers from `first` to `last`; says so in plain figures.
 CLI::Validator numbersWithin(double first, double last);
 
+/// Above 0, in world units.
+CLI::Validator isLength();
+
 /// --threads, --quiet and --json.
 void addRunOptions(CLI::App& command, CommonOptions& options);
 

@@ -21,8 +21,6 @@ namespace tessera {
 
 namespace {
 
-constexpr double kLeastLength = 1e-300, kLargestLength = 1e300;
-
 struct Arguments {
     CommonOptions common;
     std::string fields, boundary = "keep";
@@ -44,10 +42,9 @@ RegionSeed parseRegion(const std::string& text) {
 
 void addSizeOptions(CLI::App& app, SizeWishes& size) {
     const std::string group = "How fine (surfaces; world units)";
-    const CLI::Validator isLength = numbersWithin(kLeastLength, kLargestLength);
-    app.add_option("--size", size.everywhere, "length of edges everywhere")->check(isLength)->group(group);
+    app.add_option("--size", size.everywhere, "length of edges everywhere")->check(isLength())->group(group);
     app.add_option("--size-surface", size.atSurface, "length of edges at the surface")
-        ->check(isLength)
+        ->check(isLength())
         ->group(group);
     app.add_option("--size-field", size.field, "a field of the surface's points that holds the length there")
         ->group(group);
@@ -61,7 +58,7 @@ void addSizeOptions(CLI::App& app, SizeWishes& size) {
         ->capture_default_str()
         ->group(group);
     app.add_option("--min-size", size.smallest, "no shorter edges by the field or the curvature")
-        ->check(isLength)
+        ->check(isLength())
         ->group(group);
 }
 
@@ -98,13 +95,13 @@ void addShapeOptions(CLI::App& app, Arguments& a) {
         ->group(group);
     app.add_option("--hull-limit", o.hullLimitWorld,
                    "scattered points: tetrahedra with a longer edge are left out, so that bays stay empty")
-        ->check(numbersWithin(kLeastLength, kLargestLength))
+        ->check(isLength())
         ->group(group);
     app.add_flag("--repair-surface", o.repairs,
                  "merge points at the same place, remove triangles without area or there twice, and turn "
                  "triangles that run the other way round")
         ->group(group);
-    app.add_option("--field", a.fields, "fields to carry over: a,b (default: all)")->group(group);
+    app.add_option("--field", a.fields, "fields to carry over: a,b=newname (default: all)")->group(group);
 }
 
 void addLimits(CLI::App& app, ReaderArguments& reader) {
@@ -122,8 +119,7 @@ void addLimits(CLI::App& app, ReaderArguments& reader) {
 int run(const Arguments& a) {
     TetrahedralizeRequest request = a.request;
     request.options.splitsBoundary = a.boundary == "refine";
-    if (!a.fields.empty())
-        for (const FieldChoice& choice : parseFields(a.fields)) request.fields.push_back(choice.name);
+    if (!a.fields.empty()) request.fields = parseFields(a.fields);
     for (const std::string& hole : a.holes) request.options.holesWorld.push_back(parseVector("--hole", hole));
     for (const std::string& region : a.regions) request.options.regions.push_back(parseRegion(region));
     Session session(a.common, request.output);

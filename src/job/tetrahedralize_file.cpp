@@ -71,10 +71,15 @@ TetrahedralizeResult tetrahedralizeFile(const TetrahedralizeRequest& request, Jo
     Timer timer;
     TetrahedralizeResult result;
     ReadOptions read;
-    read.fields = request.fields;
+    read.fields = sourceNames(request.fields, {});
     result.mesh = makeTetrahedra(request.input, read, request.options, job);
     result.makeMs = timer.restart();
-    const TetMesh& mesh = result.mesh.mesh;
+    TetMesh& mesh = result.mesh.mesh;
+    if (!request.fields.empty()) {
+        const FieldSelection chosen = selectFields(mesh, request.fields);
+        for (std::size_t i = 0; i < chosen.fields.size(); ++i)
+            mesh.fields[std::size_t(chosen.fields[i])].name = chosen.outputs[i].name;
+    }
     result.shapes = measureShapes(mesh, job.execution.withoutProgress());
     result.volumeWorld = totalVolume(mesh, job.execution.withoutProgress());
     timer.restart();

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "job/field_selection.h"
 #include "job/job.h"
 #include "job/run_report.h"
 #include "mesh/shape_statistics.h"
@@ -12,7 +13,7 @@ namespace tessera {
 /// What `tessera-tetrahedralize` is asked for.
 struct TetrahedralizeRequest {
     std::string input, output;        ///< output: a .vtu file; "-": standard output
-    std::vector<std::string> fields;  ///< names to carry over; empty: all
+    std::vector<FieldChoice> fields;  ///< to carry over, with their new names; empty: all
     TetrahedralizeOptions options;
 };
 

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -19,6 +20,22 @@ struct NamedText {
 
 /// Bytes that a terminal can't show as they are, as \xNN.
 std::string printable(std::string_view word);
+
+/// The number that a whole word is; none where it isn't one of the type. Numbers that are too small or too
+/// large for a double become 0 or infinite.
+template <class Number>
+std::optional<Number> numberOf(std::string_view word) {
+    if (word.starts_with('+')) word.remove_prefix(1);
+    Number value{};
+    const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
+    const bool outOfRange = result.ec == std::errc::result_out_of_range;
+    if (result.ptr != word.data() + word.size() || word.empty() ||
+        (result.ec != std::errc() && !(outOfRange && std::is_floating_point_v<Number>)))
+        return std::nullopt;
+    // from_chars leaves the value alone then.
+    if (outOfRange) value = Number(std::strtod(std::string(word).c_str(), nullptr));
+    return value;
+}
 
 inline constexpr const char* kBlanksAndCommas = " \t\r,";
 inline constexpr const char* kOnlyBlanks = " \t\r";
@@ -43,16 +60,10 @@ class NumberLines {
     template <class Number>
     Number read(const char* expected) {
         const std::string_view found = word();
-        const std::string_view digits = found.starts_with('+') ? found.substr(1) : found;
-        Number value{};
-        const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        const bool outOfRange = result.ec == std::errc::result_out_of_range;
-        if (found.empty() || result.ptr != digits.data() + digits.size() ||
-            (result.ec != std::errc() && !(outOfRange && std::is_floating_point_v<Number>)))
+        const std::optional<Number> number = numberOf<Number>(found);
+        if (!number)
             fail(std::string("expected ") + expected + ", found '" + printable(found.substr(0, 24)) + "'");
-        // from_chars leaves the value alone where it is too small or too large for a double.
-        if (outOfRange) value = Number(std::strtod(std::string(digits).c_str(), nullptr));
-        return value;
+        return *number;
     }
     /// A count of items. @param lineBytes of the shortest line that one can have; the last one needs no end
     /// of line.

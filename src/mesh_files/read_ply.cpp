@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cstring>
 #include <map>
 
@@ -29,7 +28,7 @@ struct Element {
     std::vector<Property> properties;
 };
 
-Number numberOf(NumberLines& lines, std::string_view word) {
+Number typeOf(NumberLines& lines, std::string_view word) {
     static const std::map<std::string_view, Number> kNumbers{
         {"char", Number::int8},      {"int8", Number::int8},       {"uchar", Number::uint8},
         {"uint8", Number::uint8},    {"short", Number::int16},     {"int16", Number::int16},
@@ -94,10 +93,10 @@ void PlyReader::readHead() {
             std::string_view type = lines.word();
             property.isList = type == "list";
             if (property.isList) {
-                property.countType = numberOf(lines, lines.word());
+                property.countType = typeOf(lines, lines.word());
                 type = lines.word();
             }
-            property.type = numberOf(lines, type);
+            property.type = typeOf(lines, type);
             property.name = plainName(std::string(lines.word()));
             elements_.back().properties.push_back(std::move(property));
         }
@@ -116,17 +115,12 @@ double PlyReader::readNumber(Number type, const Element& element) {
         constexpr std::string_view kBlanks = " \t\r\n";
         at_ = std::min(bytes.find_first_not_of(kBlanks, at_), bytes.size());
         const std::size_t end = std::min(bytes.find_first_of(kBlanks, at_), bytes.size());
-        std::string_view word = bytes.substr(at_, end - at_);
+        const std::string_view word = bytes.substr(at_, end - at_);
         if (word.empty()) cutOff();
-        if (word.front() == '+') word.remove_prefix(1);
-        double value = 0;
-        const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
-        if (result.ec == std::errc::invalid_argument || result.ptr != word.data() + word.size())
-            fail("expected a number, found '" + printable(word.substr(0, 24)) + "'");
-        if (result.ec == std::errc::result_out_of_range)
-            value = std::strtod(std::string(word).c_str(), nullptr);
+        const std::optional<double> number = numberOf<double>(word);
+        if (!number) fail("expected a number, found '" + printable(word.substr(0, 24)) + "'");
         at_ = end;
-        return value;
+        return *number;
     }
     const std::size_t size = kBytes[std::size_t(type)];
     if (bytes.size() - at_ < size) cutOff();

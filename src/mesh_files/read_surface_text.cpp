@@ -35,14 +35,11 @@ std::int32_t readIndex(NumberLines& lines, std::int64_t first, std::size_t point
 
 /// Of "5", "5/2", "5//7" or "-1/...": from 0.
 std::int32_t objIndex(const NumberLines& lines, std::string_view corner, std::size_t points) {
-    const std::string_view digits = corner.substr(0, corner.find('/'));
-    std::int64_t index = 0;
-    const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), index);
-    if (digits.empty() || result.ec != std::errc() || result.ptr != digits.data() + digits.size())
-        lines.fail("expected the index of a point, found '" + printable(corner.substr(0, 24)) + "'");
-    const std::int64_t place = index < 0 ? std::int64_t(points) + index : index - 1;
+    const auto index = numberOf<std::int64_t>(corner.substr(0, corner.find('/')));
+    if (!index) lines.fail("expected the index of a point, found '" + printable(corner.substr(0, 24)) + "'");
+    const std::int64_t place = *index < 0 ? std::int64_t(points) + *index : *index - 1;
     if (place < 0 || place >= std::int64_t(points))
-        lines.fail("point " + std::to_string(index) + " is none of the " + std::to_string(points) +
+        lines.fail("point " + std::to_string(*index) + " is none of the " + std::to_string(points) +
                    " before this line");
     return std::int32_t(place);
 }
@@ -240,13 +237,7 @@ std::optional<double> tableNumber(std::string_view word, char separator) {
     if (separator != ',' && word.find('.') == std::string_view::npos)
         if (const std::size_t comma = word.find(','); comma != std::string_view::npos)
             word = withPoint.append(word).replace(comma, 1, 1, '.');
-    if (word.front() == '+') word.remove_prefix(1);
-    double value = 0;
-    const auto result = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (result.ptr != word.data() + word.size() || result.ec == std::errc::invalid_argument)
-        return std::nullopt;
-    if (result.ec == std::errc::result_out_of_range) value = std::strtod(std::string(word).c_str(), nullptr);
-    return value;
+    return numberOf<double>(word);
 }
 
 /// Of "v:2" the 2.

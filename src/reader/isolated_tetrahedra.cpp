@@ -1,10 +1,7 @@
 #include "reader/isolated_tetrahedra.h"
 
-#include <algorithm>
 #include <span>
 
-#include "base/machine_memory.h"
-#include "reader/mesh_packet.h"
 #include "reader/packet.h"
 #include "tessera/error.h"
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mesh/mesh_quality.h"
+#include "surface/keep_points.h"
 #include "surface/shell_nest.h"
 #include "surface/surface_edges.h"
 #include "surface/unfit_triangles.h"
@@ -78,27 +79,12 @@ std::int64_t mergePoints(Surface& surface, const Execution& execution) {
     const std::vector<std::int32_t> first = firstNodeAtPlace(surface.points, execution);
     for (Field& field : surface.fields)
         for (int c = 0; c < field.components; ++c) takeMeans(first, c, field);
-    std::vector<std::int32_t> newOf(first.size());
-    std::size_t kept = 0;
-    for (std::size_t p = 0; p < first.size(); ++p) {
-        const auto earlier = std::size_t(first[p]);
-        if (earlier != p) {
-            newOf[p] = newOf[earlier];
-            continue;
-        }
-        newOf[p] = std::int32_t(kept);
-        surface.points[kept] = surface.points[p];
-        for (Field& field : surface.fields)
-            for (std::size_t c = 0, n = std::size_t(field.components); c < n; ++c)
-                field.values[kept * n + c] = field.values[p * n + c];
-        ++kept;
-    }
-    const auto merged = std::int64_t(surface.points.size() - kept);
-    surface.points.resize(kept);
-    for (Field& field : surface.fields) field.values.resize(kept * std::size_t(field.components));
     for (auto& triangle : surface.triangles)
-        for (std::int32_t& point : triangle) point = newOf[std::size_t(point)];
-    return merged;
+        for (std::int32_t& corner : triangle) corner = first[std::size_t(corner)];
+    std::vector<char> isFirst(first.size());
+    for (std::size_t p = 0; p < first.size(); ++p) isFirst[p] = std::size_t(first[p]) == p;
+    keepPoints(isFirst, surface);
+    return std::int64_t(first.size() - surface.points.size());
 }
 
 std::int64_t turnTriangles(Surface& surface, Outwards outwards, const Execution& execution) {

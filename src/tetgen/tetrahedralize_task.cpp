@@ -18,6 +18,7 @@
 #include "surface/check_surface.h"
 #include "surface/exact_normal.h"
 #include "surface/extend_fields.h"
+#include "surface/keep_points.h"
 #include "surface/shell_of_place.h"
 #include "tessera/error.h"
 #include "tetgen/run_tetgen.h"
@@ -34,26 +35,6 @@ constexpr double kRounding = 0x1p-49;  // of coordinates up to 1, and a little m
 /// "1 point", "12 points".
 std::string counted(std::int64_t count, const std::string& thing) {
     return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
-}
-
-/// Leaves out every point but those kept, with their values. @param number gets each one's new number.
-void keepPoints(const std::vector<char>& isKept, Surface& surface, std::vector<std::int32_t>& number) {
-    number.assign(surface.points.size(), -1);
-    std::int32_t kept = 0;
-    for (std::size_t p = 0; p < isKept.size(); ++p) {
-        if (!isKept[p]) continue;
-        number[p] = kept;
-        surface.points[std::size_t(kept++)] = surface.points[p];
-    }
-    for (Field& field : surface.fields) {
-        const auto components = std::size_t(field.components);
-        for (std::size_t p = 0; p < isKept.size(); ++p)
-            if (isKept[p])
-                std::copy_n(field.values.begin() + std::ptrdiff_t(p * components), components,
-                            field.values.begin() + std::ptrdiff_t(std::size_t(number[p]) * components));
-        field.values.resize(std::size_t(kept) * components);
-    }
-    surface.points.resize(std::size_t(kept));
 }
 
 /// Throws InputError where no four points span a volume. Merged points differ, so the largest isn't 0.
@@ -219,10 +200,7 @@ void Tetrahedralization::checkSurface() {
     const auto unused = std::count(isUsed.begin(), isUsed.end(), 0);
     if (unused == 0) return;
     note(counted(unused, "point") + " of no triangle left out.");
-    std::vector<std::int32_t> number;
-    keepPoints(isUsed, surface_, number);
-    for (auto& triangle : surface_.triangles)
-        for (std::int32_t& corner : triangle) corner = number[std::size_t(corner)];
+    keepPoints(isUsed, surface_);
 }
 
 TetgenOutput Tetrahedralization::ofPoints() {

@@ -331,6 +331,11 @@ class Fields(TetrahedralizeTest):
             self.assertTrue((mesh.point_fields[name] >= values.min(axis=0) - slack).all(), name)
             self.assertTrue((mesh.point_fields[name] <= values.max(axis=0) + slack).all(), name)
 
+    def test_fields_can_get_other_names(self):
+        self.write("ball.vtp", surfaces.with_fields(surfaces.sphere(1)))
+        mesh, _ = self.mesh("ball.vtp", "--field", "heat=T")
+        self.assertEqual(list(mesh.point_fields), ["T"])
+
     def test_fields_can_be_chosen(self):
         ball = self.write("sphere.vtp", surfaces.with_fields(surfaces.sphere(1)))
         mesh, _ = self.mesh(ball, "--field", "heat")
