@@ -10,6 +10,8 @@ namespace tessera {
 
 namespace {
 
+constexpr std::size_t kFewPartSizes = 6, kFewThreads = std::size_t(1) << 18;
+
 std::uint32_t packed(const Vec3i& place) {
     return std::uint32_t(place.x) | std::uint32_t(place.y) << 8 | std::uint32_t(place.z) << 16;
 }
@@ -46,6 +48,7 @@ std::size_t firstBucket(std::size_t i) {
 
 }  // namespace
 
+// A brick's boxes have few parts: its runs are always four.
 std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first) {
     std::vector<ScanRun> runs;
     for (const bool isThin : {false, true}) {
@@ -53,11 +56,11 @@ std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes
         std::size_t most = kPartSizes;
         while (most > 0 && at[most + 1] == at[most]) --most;
         const auto add = [&](std::size_t from, std::size_t to) {
-            if (at[to + 1] > at[from]) runs.push_back({isThin, at[from], at[to + 1] - at[from], 1u << to});
+            runs.push_back({isThin, at[from], at[to + 1] - at[from], std::uint32_t(to)});
         };
         add(0, 0);
-        // Where there is room for them, all larger boxes in one go.
-        if (std::size_t(at[most + 1] - at[1]) << most <= kPartRoom)
+        // Where threads without a part cost little, all larger boxes in one go.
+        if (most <= kFewPartSizes || std::size_t(at[most + 1] - at[1]) << most <= kFewThreads)
             add(1, std::max<std::size_t>(1, most));
         else
             for (std::size_t size = 1; size <= most; ++size) add(size, size);

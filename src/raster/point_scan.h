@@ -15,13 +15,11 @@ namespace tessera {
 /// ones, as they are drawn; points that the processor decided come last. The record stands in the lower bits.
 inline constexpr int kRankKindShift = 28;
 
-/// A thread goes through no more points of a box: larger boxes are cut into parts.
+/// A thread goes through no more points of a box: larger boxes have a thread a part.
 inline constexpr int kPartPoints = 192;
 /// Powers of two in the number of parts.
 inline constexpr std::size_t kPartSizes = 18;
 inline constexpr std::size_t kMostScanRuns = 2 * (1 + kPartSizes);
-/// Parts that there is room for on the device.
-inline constexpr std::size_t kPartRoom = std::size_t(1) << kPartSizes;
 
 /// Points of a region that an element may cover, 8 bits an axis; as the shaders read it.
 struct ScanBox {
@@ -33,7 +31,7 @@ struct ScanBox {
 struct ScanRun {
     bool isThin;  ///< else their elements are easy
     std::size_t first, count;
-    std::uint32_t parts;  ///< of a box, at most
+    std::uint32_t partBits;  ///< threads a box, as a power of two: no fewer than its parts
 };
 
 /// What compute shaders go through: a box an element.

@@ -21,6 +21,9 @@ constexpr int kPadding = kSmallExtent + 2;
 constexpr const char* kDepthScale = "1.220703125e-4";
 /// Of a scan: dispatches that may be made once more, and bytes of what it notes.
 constexpr std::size_t kMostAgain = kMostScanRuns + 2;
+constexpr std::size_t kThreadsAtOnce = std::size_t(1) << 28;
+/// Of a region so small that a list of contenders costs more than it saves.
+constexpr std::size_t kFewPoints = 20 * 20 * 20;
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes of each corner until it has drawn it.
 constexpr std::size_t kCornersAtOnce = std::size_t(3) << 14;
@@ -135,11 +138,8 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
         return makeComputeProgram(context, main, std::move(shared), defines);
     };
     switch (stage) {
-        case Stage::parts:
-            return made(text::kScanParts, {text::kRecordTypes, text::kRecord, text::kScanMarks,
-                                           text::kScanBoxes, text::kScanPartCounts});
         case Stage::plan:
-            return made(text::kScanPlan, {text::kScanMarks, text::kScanPartCounts});
+            return made(text::kScanPlan, {text::kScanMarks});
         case Stage::clear:
             return made(text::kScanClear, {text::kScanMarks});
         case Stage::contenders0:
@@ -158,7 +158,7 @@ GlProgram RasterDevice::makeScanProgram(GlContext& context, const Variant& varia
             return made(text::kScanPoints, {text::kDecide, text::kScanMarks, text::kDecidedPoints});
         default:
             return made(text::kScanElements, {text::kRecordTypes, text::kRecord, text::kDecide,
-                                              text::kScanMarks, text::kScanBoxes, text::kScanPartCounts});
+                                              text::kScanMarks, text::kScanBoxes});
     }
 }
 
@@ -488,7 +488,6 @@ void RasterDevice::draw(GlContext& context, const std::vector<DecidedPoint>& poi
 }
 
 void RasterDevice::prepareScan(GlContext& context) {
-    const GlFunctions& gl = context.functions();
     const std::int64_t points = std::int64_t(size_.x) * size_.y * size_.z;
     if (!owners_ || !orders_ || owners_.bytes() < points * kOwnerBytes) {
         areOwnersClear_ = false;  // there may be room for one of them only
@@ -504,10 +503,6 @@ void RasterDevice::prepareScan(GlContext& context) {
         contenders_ = GlBuffer(context, bytes, 0);
     }
     if (!dispatches_) dispatches_ = GlBuffer(context, 3 * (kMostAgain + 1) * sizeof(GLuint), 0);
-    if (!parts_) parts_ = GlBuffer(context, std::int64_t(kPartRoom * sizeof(ScanBox)), 0);
-    constexpr GLuint kNoParts[2][4] = {{0, 1, 1, 0}, {0, 1, 1, 0}};
-    if (!partCounts_) partCounts_ = GlBuffer(context, sizeof kNoParts, GL_DYNAMIC_STORAGE_BIT);
-    gl.NamedBufferSubData(partCounts_.id(), 0, sizeof kNoParts, kNoParts);
     if (!areOwnersClear_) fill(context, owners_, std::size_t(owners_.bytes()));
     fill(context, contenders_, std::size_t(kContenderBytes));
     areOwnersClear_ = false;
@@ -534,19 +529,19 @@ void RasterDevice::findOwners(GlContext& context, const ScanRecords& records, st
                               GLuint pointBuffer) {
     const GlFunctions& gl = context.functions();
     const std::size_t all = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
-    // Of all points, decided points, and runs of boxes, of larger ones for a full list of parts.
+    const auto mostBoxes = [](const ScanRun& run) { return kThreadsAtOnce >> run.partBits; };
+    // Of all points, decided points, and runs of boxes.
     constexpr std::size_t ofAll = 0, ofDecided = 1, ofRuns = 2;
     std::vector<std::array<GLuint, 3>> groups{groupsOf(all), groupsOf(points)};
     for (const ScanRun& run : records.runs)
-        groups.push_back(
-            groupsOf(run.parts == 1 ? run.count : run.parts * std::min(run.count, kPartRoom / run.parts)));
-    const auto dispatchBy = [&](const GlBuffer& buffer, GLintptr at) {
-        gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, buffer.id());
-        gl.DispatchComputeIndirect(at);
+        groups.push_back(groupsOf(std::min(run.count, mostBoxes(run)) << run.partBits));
+    const auto dispatchPlanned = [&](std::size_t i) {
+        gl.BindBuffer(GL_DISPATCH_INDIRECT_BUFFER, dispatches_.id());
+        gl.DispatchComputeIndirect(GLintptr(i * sizeof(groups[0])));
     };
-    const auto dispatch = [&](std::size_t i, bool isAgain) {
-        if (isAgain)
-            dispatchBy(dispatches_, GLintptr((i + 1) * sizeof(groups[0])));
+    const auto dispatch = [&](std::size_t i, bool isPlanned) {
+        if (isPlanned)
+            dispatchPlanned(i + 1);
         else
             gl.DispatchCompute(groups[i][0], groups[i][1], groups[i][2]);
     };
@@ -554,55 +549,36 @@ void RasterDevice::findOwners(GlContext& context, const ScanRecords& records, st
     const auto use = [&](Stage stage, bool isThin = false) -> const GlProgram& {
         return useScan(context, {stage, isThin, 1, 0});
     };
-    // Buffers change places: there need not be more than eight.
-    int chunk = 0;
-    const auto useOnBoxes = [&](Stage stage, bool isThin, GLuint buffer, std::size_t first,
-                                std::size_t count) -> const GlProgram& {
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, buffer);
-        const GlProgram& used = use(stage, isThin);
-        gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(first));
-        gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(count));
-        return used;
-    };
-    const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isAgain) {
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, partCounts_.id());
-        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, parts_.id());
+    const auto noteAll = [&](Stage ofElements, Stage ofPoints, bool isPlanned) {
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, records.boxes);
         for (std::size_t r = 0; r < records.runs.size(); ++r) {
             const ScanRun& run = records.runs[r];
             gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 0,
                               run.isThin ? records.thinGeometry : records.easyGeometry);
-            if (run.parts == 1) {
-                const GlProgram& used =
-                    useOnBoxes(ofElements, run.isThin, records.boxes, run.first, run.count);
-                gl.ProgramUniform1i(used.id(), used.uniform("chunk"), -1);
-                dispatch(ofRuns + r, isAgain);
-                continue;
-            }
-            const std::size_t most = kPartRoom / run.parts;
-            for (std::size_t first = 0; first < run.count; first += most, ++chunk) {
-                const std::size_t count = std::min(most, run.count - first);
-                const GlProgram& cuts =
-                    useOnBoxes(Stage::parts, run.isThin, records.boxes, run.first + first, count);
-                gl.ProgramUniform1ui(cuts.id(), cuts.uniform("partsABox"), run.parts);
-                gl.ProgramUniform1ui(cuts.id(), cuts.uniform("chunk"), GLuint(chunk));
-                dispatch(ofRuns + r, isAgain);
-                gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_COMMAND_BARRIER_BIT);
-                const GlProgram& used = useOnBoxes(ofElements, run.isThin, parts_.id(), 0, 0);
-                gl.ProgramUniform1i(used.id(), used.uniform("chunk"), chunk);
-                dispatchBy(partCounts_, GLintptr(chunk % 2) * GLintptr(4 * sizeof(GLuint)));
-                gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
-            }
+            const GlProgram& used = use(ofElements, run.isThin);
+            gl.ProgramUniform1ui(used.id(), used.uniform("partBits"), run.partBits);
+            std::size_t first = 0;
+            do {
+                const std::size_t count = std::min(mostBoxes(run), run.count - first);
+                gl.ProgramUniform1ui(used.id(), used.uniform("firstBox"), GLuint(run.first + first));
+                gl.ProgramUniform1ui(used.id(), used.uniform("boxCount"), GLuint(count));
+                dispatch(ofRuns + r, isPlanned);
+                first += count;
+            } while (first < run.count);
         }
-        if (points > 0) {
-            gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
-            const GlProgram& used = use(ofPoints);
-            gl.ProgramUniform1ui(used.id(), used.uniform("pointCount"), GLuint(points));
-            dispatch(ofDecided, isAgain);
-        }
+        gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 6, pointBuffer);
+        const GlProgram& used = use(ofPoints);
+        gl.ProgramUniform1ui(used.id(), used.uniform("pointCount"), GLuint(points));
+        dispatch(ofDecided, isPlanned);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     };
+    if (all <= kFewPoints) {
+        fill(context, orders_, all * std::size_t(kOwnerBytes));
+        noteAll(Stage::elementOrders, Stage::pointOrders, false);
+        noteAll(Stage::elementRanks, Stage::pointRanks, false);
+        return;
+    }
     noteAll(Stage::elementFirst, Stage::pointFirst, false);
-    gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 4, partCounts_.id());
     gl.BindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, dispatches_.id());
     const GlProgram& plan = use(Stage::plan);
     gl.ProgramUniform3uiv(plan.id(), plan.uniform("groupsAgain"), GLsizei(groups.size()), groups[0].data());
@@ -614,7 +590,7 @@ void RasterDevice::findOwners(GlContext& context, const ScanRecords& records, st
     for (const Stage stage :
          {Stage::contenders0, Stage::contenders1, Stage::contenders2, Stage::contenders3}) {
         use(stage);
-        dispatchBy(dispatches_, 0);
+        dispatchPlanned(0);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     }
     const GlProgram& clear = use(Stage::clear);

@@ -111,7 +111,6 @@ class RasterDevice {
         pointFirst,
         pointOrders,
         pointRanks,
-        parts,
         plan,
         clear,
         contenders0,
@@ -208,7 +207,6 @@ class RasterDevice {
     GlTexture alphaTexture_;
     GlBuffer owners_, orders_, contenders_;  ///< of a scan's points
     GlBuffer dispatches_;
-    GlBuffer parts_, partCounts_;  ///< of a scan's larger boxes, a chunk after the other
     std::int64_t contenderRoom_ = 0;
     bool isTight_ = false;
     bool areOwnersClear_ = false;  ///< no scan was broken off

@@ -1,4 +1,4 @@
-// Boxes of elements, or parts of them.
+// Boxes of elements.
 struct Box {
     uint rank;
     uint low, last;  // points of the region, 8 bits an axis

@@ -8,8 +8,6 @@ uniform uint againCount;
 
 void main() {
     if (threadIndex() != 0u) return;
-    clearPartCount(0u);
-    clearPartCount(1u);
     bool fits = contenderCount <= contenderRoom;
     uint ofContenders = fits ? (contenderCount + GROUP_THREADS - 1u) / GROUP_THREADS : 0u;
     uint rows = (ofContenders + GROUPS_A_ROW - 1u) / GROUPS_A_ROW;

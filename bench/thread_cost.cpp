@@ -1,0 +1,80 @@
+// What the threads that ask for samples do while a device makes them: thread_cost mesh.vtu [--points 256].
+// Samples stay on the device, whose own threads do not count. What llvmpipe does on the thread that draws,
+// the shading of vertices, does.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ctime>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "arguments.h"
+#include "base/timer.h"
+#include "bench_statistics.h"
+#include "device/device_samples.h"
+#include "gl/gl_thread.h"
+#include "mesh_files/read_mesh.h"
+#include "raster/channel_coding.h"
+#include "resample/statistic_names.h"
+#include "tessera/registry.h"
+
+namespace {
+
+using namespace tessera;
+
+double threadMs() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return double(time.tv_sec) * 1e3 + double(time.tv_nsec) * 1e-6;
+}
+
+struct Times {
+    double wallMs = 0, callerMs = 0, glMs = 0;
+};
+
+}  // namespace
+
+int main(int wordCount, char** words) {
+    std::string path;
+    int points = 256, runs = 5;
+    tessera::bench::Arguments arguments("What the threads that ask a device for samples do themselves.");
+    arguments.addNeeded("mesh", path, "a mesh file");
+    arguments.add("--points", points, "lattice points along the longest edge of the mesh", {2, 1024});
+    arguments.add("--runs", runs, "that are timed", {1, 1000});
+    return arguments.run(wordCount, words, [&] {
+        const TetMesh mesh = readMesh(path, {}, {}).mesh;
+        const std::vector<int> fields{0};
+        const Box3d bounds = mesh.boundsWorld();
+        const Vec3d size = bounds.size();
+        const Lattice lattice =
+            Lattice::axisParallel(bounds.min, std::max({size.x, size.y, size.z}) / (points - 1));
+        const IndexBox box{Vec3i(0), Vec3i(points)};
+        GlThread& thread = sharedGlThread(chooseGlPlatform({}));
+        const auto slots = DeviceSamples::make(
+            thread, std::span(&box, 1), codingsOf(mesh, fields, SampleFormat::r32f), SampleFormat::r32f);
+        fmt::print("{:<10}{:>10}{:>16}{:>16}\n", "", "ms", "calling thread", "OpenGL's");
+        for (const Resampler* resampler : resamplers()) {
+            if (!resampler->info().isOnDevice || !resampler->info().meetsContract) continue;
+            const auto bound =
+                resampler->bind(mesh, fields, {.target = std::string(nameOf(thread.platform()))});
+            std::vector<Times> all;
+            for (int run = -1; run < runs; ++run) {  // the first one compiles shaders and uploads the mesh
+                const auto onGl = [&] { return thread.run([](GlContext&) { return threadMs(); }); };
+                const double gl = onGl(), caller = threadMs();
+                const Timer timer;
+                bound->resampleToDevice(lattice, std::span(&box, 1), *slots, {});
+                thread.run([](GlContext& context) { context.functions().Finish(); });
+                const Times times{timer.elapsedMs(), threadMs() - caller, onGl() - gl};
+                if (run >= 0) all.push_back(times);
+            }
+            const auto of = [&](auto member) {
+                return tessera::bench::medianOf(all, [&](const Times& t) { return t.*member; });
+            };
+            fmt::print("{:<10}{:>10.1f}{:>16.2f}{:>16.2f}\n", resampler->name(), of(&Times::wallMs),
+                       of(&Times::callerMs), of(&Times::glMs));
+        }
+        return 0;
+    });
+}
