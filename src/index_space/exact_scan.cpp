@@ -180,59 +180,103 @@ class ExactChannel {
     double step_ = 0;
 };
 
-// Decides most scanlines of a thin element in double precision: all but those with an end too close to a
-// lattice point.
+// A sum of two doubles, the second below the rounding of the first: 105 bits or so.
+struct Sum {
+    double high, low;
+};
+template <class Real>
+Sum sumOf(const Real& x) {
+    const double high = toDouble(x);
+    return {high, toDouble(Real(x - Real(high)))};
+}
+Sum operator*(const Sum& p, double factor) {
+    const double high = p.high * factor;
+    return {high, std::fma(p.high, factor, -high) + p.low * factor};
+}
+Sum operator+(const Sum& p, const Sum& q) {
+    const double sum = p.high + q.high, ofQ = sum - p.high;
+    const double rest = (p.high - (sum - ofQ)) + (q.high - ofQ) + (p.low + q.low), high = sum + rest;
+    return {high, rest - (high - sum)};
+}
+
+// Decides nearly all scanlines of a thin element: in double precision, or else in pairs of doubles all but
+// those with an end within 2^-100 or so of a lattice point.
 class RoughScanlines {
   public:
     template <class Real>
     RoughScanlines(const ExactElement<Real>& e, int s, int t, int r) {
-        const double slack = e.dilation == 0 ? 0.0 : kBoxSlack;
-        low_ = toDouble(Real(e.low[s] - Real(slack)));
-        high_ = toDouble(Real(e.high[s] + Real(slack)));
+        const Real slack = e.dilation == 0 ? 0.0 : kBoxSlack;
+        planes_[0] = {sumOf(Real(e.low[s] - slack)), {0, 0}, {0, 0}, Side::lower};
+        planes_[1] = {sumOf(Real(e.high[s] + slack)), {0, 0}, {0, 0}, Side::upper};
         for (int k = 0; k < 4; ++k) {
-            const double slope = toDouble(e.gradient[k][s]);
-            const double a = toDouble(Real(-(e.dilation + e.constant[k]))) / slope;
-            const double b = -toDouble(e.gradient[k][t]) / slope, c = -toDouble(e.gradient[k][r]) / slope;
-            // A face along the scanline, or one whose solution would overflow, decides nothing here.
-            if (std::fabs(a) + std::fabs(b) + std::fabs(c) < 1e200)
-                plane_[count_++] = {a, b, c, slope > 0};
+            const Real& slope = e.gradient[k][s];
+            const Real by = slope == 0 ? Real(1) : Real(-slope);
+            const Plane plane{sumOf(Real((e.dilation + e.constant[k]) / by)),
+                              sumOf(Real(e.gradient[k][t] / by)), sumOf(Real(e.gradient[k][r] / by)),
+                              slope == 0  ? Side::along
+                              : slope > 0 ? Side::lower
+                                          : Side::upper};
+            // One whose solution would overflow decides nothing here.
+            if (std::fabs(plane.a.high) + std::fabs(plane.b.high) + std::fabs(plane.c.high) < 1e200)
+                planes_[std::size_t(count_++)] = plane;
             else
-                complete_ = false;
+                isComplete_ = false;
         }
     }
 
     /// True when the answer is certain: the voxels from begin to end, none when begin > end.
     bool ends(double t, double r, double& begin, double& end) const {
-        double low[2] = {low_ - kUnit * std::fabs(low_), low_ + kUnit * std::fabs(low_)};
-        double high[2] = {high_ - kUnit * std::fabs(high_), high_ + kUnit * std::fabs(high_)};
-        for (int i = 0; i < count_; ++i) {
-            const Plane& p = plane_[i];
-            const double bound = (p.a + p.b * t) + p.c * r;
-            const double error = kUnit * (std::fabs(p.a) + std::fabs(p.b * t) + std::fabs(p.c * r));
-            if (p.lower) {
-                low[0] = std::max(low[0], bound - error);
-                low[1] = std::max(low[1], bound + error);
-            } else {
-                high[0] = std::min(high[0], bound - error);
-                high[1] = std::min(high[1], bound + error);
-            }
-        }
-        begin = std::ceil(low[0]);
-        end = std::floor(high[1]);
-        if (begin > end) return true;
-        return complete_ && begin == std::ceil(low[1]) && end == std::floor(high[0]);
+        const auto inDouble = [&](const Plane& p) {
+            return Sum{(p.a.high + p.b.high * t) + p.c.high * r, 0};
+        };
+        const auto inSums = [&](const Plane& p) { return (p.a + p.b * t) + p.c * r; };
+        return find(inDouble, 0x1p-48, t, r, begin, end) || find(inSums, 0x1p-100, t, r, begin, end);
     }
 
   private:
-    static constexpr double kUnit = 0x1p-48;  // above the rounding of a, b, c and of the sum
+    enum class Side { lower, upper, along };
+    /// a + b t + c r is where a face ends scanlines; of one along them, not negative where they meet it.
     struct Plane {
-        double a, b, c;
-        bool lower;
+        Sum a, b, c;
+        Side side;
     };
-    double low_, high_;
-    Plane plane_[4];
-    int count_ = 0;
-    bool complete_ = true;
+
+    // @param unit of the error, above the rounding of a, b, c and of the bound.
+    template <class Bound>
+    bool find(const Bound& boundOf, double unit, double t, double r, double& begin, double& end) const {
+        constexpr double kInfinity = std::numeric_limits<double>::infinity();
+        double begins[2] = {-kInfinity, -kInfinity}, lasts[2] = {kInfinity, kInfinity};  // least and most
+        bool isCertain = isComplete_;
+        for (int i = 0; i < count_; ++i) {
+            const Plane& p = planes_[std::size_t(i)];
+            const Sum bound = boundOf(p);
+            const double error =
+                unit * (std::fabs(p.a.high) + std::fabs(p.b.high * t) + std::fabs(p.c.high * r));
+            if (p.side == Side::along) {
+                const double value = bound.high + bound.low;
+                if (value < -error) begins[0] = kInfinity;
+                isCertain &= value < -error || value > error;
+                continue;
+            }
+            const double nearest = std::nearbyint(bound.high), beyond = (bound.high - nearest) + bound.low;
+            // Whole numbers as far away as that have no neighbours.
+            const double far = std::fabs(nearest) < 0x1p52 ? 0 : 0x1p-50 * std::fabs(nearest);
+            if (p.side == Side::lower) {
+                begins[0] = std::max(begins[0], nearest - far + (beyond > error ? 1 : 0));
+                begins[1] = std::max(begins[1], nearest + far + (beyond >= -error ? 1 : 0));
+            } else {
+                lasts[0] = std::min(lasts[0], nearest - far - (beyond <= error ? 1 : 0));
+                lasts[1] = std::min(lasts[1], nearest + far - (beyond < -error ? 1 : 0));
+            }
+        }
+        begin = begins[0];
+        end = lasts[1];
+        return begin > end || (isCertain && begins[0] == begins[1] && lasts[0] == lasts[1]);
+    }
+
+    std::array<Plane, 6> planes_;
+    int count_ = 2;
+    bool isComplete_ = true;
 };
 
 // Ends of the scanline at (t, r) along axis `s`, relative to the first voxel.
@@ -357,27 +401,33 @@ void scanElementExactly(const ScanInput& input, const ScanOutput& output, std::i
 }
 
 struct ExactScanlines::Impl {
-    int axis;
+    int s, t, r;
     std::optional<ExactElement<Quad>> quad;
     std::optional<ExactElement<mpq_class>> exact;
+    std::optional<RoughScanlines> rough;
 };
 
 ExactScanlines::ExactScanlines(const ScanInput& input, std::int32_t element, int axis)
     : impl_(std::make_unique<Impl>()) {
-    impl_->axis = axis;
+    const int s = impl_->s = axis, t = impl_->t = axis == 0 ? 1 : 0, r = impl_->r = axis == 2 ? 1 : 2;
     impl_->quad.emplace();
     firstVoxel(input, element, impl_->quad->base);
-    if (setUp(input, element, *impl_->quad)) return;
+    if (setUp(input, element, *impl_->quad)) {
+        impl_->rough.emplace(*impl_->quad, s, t, r);
+        return;
+    }
     impl_->quad.reset();
     impl_->exact.emplace();
     firstVoxel(input, element, impl_->exact->base);
     setUp(input, element, *impl_->exact);
+    impl_->rough.emplace(*impl_->exact, s, t, r);
 }
 
 ExactScanlines::~ExactScanlines() = default;
 
 void ExactScanlines::ends(double atT, double atR, double& begin, double& end) const {
-    const int s = impl_->axis, t = s == 0 ? 1 : 0, r = s == 2 ? 1 : 2;
+    if (impl_->rough->ends(atT, atR, begin, end)) return;
+    const int s = impl_->s, t = impl_->t, r = impl_->r;
     const bool some = impl_->quad ? scanlineEnds(*impl_->quad, s, t, r, atT, atR, begin, end)
                                   : scanlineEnds(*impl_->exact, s, t, r, atT, atR, begin, end);
     if (!some) {
