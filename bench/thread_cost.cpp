@@ -31,7 +31,7 @@ double threadMs() {
 }
 
 struct Times {
-    double wallMs = 0, callerMs = 0, glMs = 0;
+    double wallMs = 0, callerMs = 0, glMs = 0, uploadBytes = 0;
 };
 
 }  // namespace
@@ -50,31 +50,46 @@ int main(int wordCount, char** words) {
         const Vec3d size = bounds.size();
         const Lattice lattice =
             Lattice::axisParallel(bounds.min, std::max({size.x, size.y, size.z}) / (points - 1));
-        const IndexBox box{Vec3i(0), Vec3i(points)};
+        std::vector<IndexBox> bricks;  // 4 x 4 x 4 in the middle
+        for (int z = 0; z < 4; ++z)
+            for (int y = 0; y < 4; ++y)
+                for (int x = 0; x < 4; ++x) {
+                    const Vec3i corner = Vec3i(size / (2 * lattice.uWorld.x)) - 32 + 16 * Vec3i(x, y, z);
+                    bricks.push_back({corner, corner + 16});
+                }
         GlThread& thread = sharedGlThread(chooseGlPlatform({}));
-        const auto slots = DeviceSamples::make(
-            thread, std::span(&box, 1), codingsOf(mesh, fields, SampleFormat::r32f), SampleFormat::r32f);
-        fmt::print("{:<10}{:>10}{:>16}{:>16}\n", "", "ms", "calling thread", "OpenGL's");
-        for (const Resampler* resampler : resamplers()) {
-            if (!resampler->info().isOnDevice || !resampler->info().meetsContract) continue;
-            const auto bound =
-                resampler->bind(mesh, fields, {.target = std::string(nameOf(thread.platform()))});
-            std::vector<Times> all;
-            for (int run = -1; run < runs; ++run) {  // the first one compiles shaders and uploads the mesh
-                const auto onGl = [&] { return thread.run([](GlContext&) { return threadMs(); }); };
-                const double gl = onGl(), caller = threadMs();
-                const Timer timer;
-                bound->resampleToDevice(lattice, std::span(&box, 1), *slots, {});
-                thread.run([](GlContext& context) { context.functions().Finish(); });
-                const Times times{timer.elapsedMs(), threadMs() - caller, onGl() - gl};
-                if (run >= 0) all.push_back(times);
+        fmt::print("{:<28}{:>10}{:>16}{:>12}{:>12}\n", "", "ms", "calling thread", "OpenGL's", "uploaded");
+        for (const Resampler* resampler : resamplers())
+            for (const std::vector<IndexBox>& boxes :
+                 {std::vector{IndexBox{Vec3i(0), Vec3i(points)}}, bricks}) {
+                if (!resampler->info().isOnDevice || !resampler->info().meetsContract) continue;
+                const auto slots = DeviceSamples::make(
+                    thread, boxes, codingsOf(mesh, fields, SampleFormat::r32f), SampleFormat::r32f);
+                BindOptions bind;
+                bind.target = std::string(nameOf(thread.platform()));
+                bind.route = boxes.size() > 1 ? Route::index : Route::automatic;
+                const auto bound = resampler->bind(mesh, fields, bind);
+                std::vector<Times> all;
+                for (int run = -1; run < runs;
+                     ++run) {  // the first one compiles shaders and uploads the mesh
+                    const auto onGl = [&] { return thread.run([](GlContext&) { return threadMs(); }); };
+                    const double gl = onGl(), caller = threadMs();
+                    const Timer timer;
+                    const ResampleStatistics statistics = bound->resampleToDevice(lattice, boxes, *slots, {});
+                    thread.run([](GlContext& context) { context.functions().Finish(); });
+                    const Times times{timer.elapsedMs(), threadMs() - caller, onGl() - gl,
+                                      double(statistics.count(counted::uploadBytes))};
+                    if (run >= 0) all.push_back(times);
+                }
+                const auto of = [&](auto member) {
+                    return tessera::bench::medianOf(all, [&](const Times& t) { return t.*member; });
+                };
+                fmt::print("{:<28}{:>10.1f}{:>16.2f}{:>12.2f}{:>12.0f}\n",
+                           fmt::format("{}, {}", resampler->name(),
+                                       boxes.size() > 1 ? "64 bricks of 16^3" : fmt::format("{}^3", points)),
+                           of(&Times::wallMs), of(&Times::callerMs), of(&Times::glMs),
+                           of(&Times::uploadBytes));
             }
-            const auto of = [&](auto member) {
-                return tessera::bench::medianOf(all, [&](const Times& t) { return t.*member; });
-            };
-            fmt::print("{:<10}{:>10.1f}{:>16.2f}{:>16.2f}\n", resampler->name(), of(&Times::wallMs),
-                       of(&Times::callerMs), of(&Times::glMs));
-        }
         return 0;
     });
 }

@@ -17,6 +17,8 @@ inline constexpr int kRankKindShift = 28;
 
 /// A thread goes through no more points of a box: larger boxes have a thread a part.
 inline constexpr int kPartPoints = 192;
+/// A brick and a little more: a region no larger is settled without lists, whatever is near it.
+inline constexpr std::int64_t kFewPoints = 20 * 20 * 20;
 /// Powers of two in the number of parts.
 inline constexpr std::size_t kPartSizes = 18;
 inline constexpr std::size_t kMostScanRuns = 2 * (1 + kPartSizes);

@@ -22,8 +22,6 @@ constexpr const char* kDepthScale = "1.220703125e-4";
 /// Of a scan: dispatches that may be made once more, and bytes of what it notes.
 constexpr std::size_t kMostAgain = kMostScanRuns + 2;
 constexpr std::size_t kThreadsAtOnce = std::size_t(1) << 28;
-/// Of a region so small that a list of contenders costs more than it saves.
-constexpr std::size_t kFewPoints = 20 * 20 * 20;
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;
 /// An emulated device keeps some hundred bytes of each corner until it has drawn it.
 constexpr std::size_t kCornersAtOnce = std::size_t(3) << 14;
@@ -572,7 +570,7 @@ void RasterDevice::findOwners(GlContext& context, const ScanRecords& records, st
         dispatch(ofDecided, isPlanned);
         gl.MemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     };
-    if (all <= kFewPoints) {
+    if (std::int64_t(all) <= kFewPoints) {
         fill(context, orders_, all * std::size_t(kOwnerBytes));
         noteAll(Stage::elementOrders, Stage::pointOrders, false);
         noteAll(Stage::elementRanks, Stage::pointRanks, false);

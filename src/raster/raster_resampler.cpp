@@ -6,6 +6,7 @@
 #include <future>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 #include "base/parallel.h"
@@ -108,9 +109,9 @@ class BoundRaster : public BoundResampler {
 
       private:
         void plan();
-        /// The mesh as the device makes records of it; null where the processor makes them.
+        /// The mesh as the device makes records of it; null where the processor makes them. A brick alone is
+        /// not worth the way to the device.
         std::shared_ptr<const DeviceMesh> meshOnDevice();
-        void placeNodes();
         void binRegions();
         /// Starts the first region that is left, the index-th of all.
         void start(std::size_t index);
@@ -149,8 +150,9 @@ class BoundRaster : public BoundResampler {
         RasterBudget budget_;
         QueueRoom room_;
 
-        std::optional<TetMesh> part_;          ///< what is near the boxes, where that is little
-        std::vector<ChannelCoding> channels_;  ///< of the part or of the whole mesh
+        std::optional<std::vector<std::int32_t>> near_;  ///< the elements near the boxes, where they are few
+        std::optional<TetMesh> part_;                    ///< those, where the processor makes the records
+        std::vector<ChannelCoding> channels_;            ///< of the part or of the whole mesh
         NodeFrame frame_;
         SliceAxes axes_;
         std::shared_ptr<const DeviceMesh> deviceMesh_;
@@ -170,6 +172,15 @@ class BoundRaster : public BoundResampler {
         if (areHere && slots.format() != format_)
             throw InputError("slots of " + std::string(nameOf(slots.format())) + " can't take samples in " +
                              std::string(nameOf(format_)));
+    }
+
+    /// Of a part of the mesh.
+    std::vector<ChannelCoding> channelsOn(const TetMesh& part) const {
+        std::vector<ChannelCoding> channels = channels_;
+        std::size_t c = 0;
+        for (const Field& field : part.fields)
+            for (int k = 0; k < field.components; ++k, ++c) channels[c] = channels[c].on(field);
+        return channels;
     }
 
     /// The published methods' results depend on the slice axis, which goes by the whole mesh.
@@ -195,13 +206,10 @@ class BoundRaster : public BoundResampler {
 
 ResampleStatistics BoundRaster::Run::all() {
     Timer timer;
-    part_ = bound_.mesh_.near(lattice_, boxes_, execution_);
-    channels_ = bound_.channels_;
-    if (part_) {
-        std::size_t c = 0;
-        for (const Field& field : part_->fields)
-            for (int k = 0; k < field.components; ++k, ++c) channels_[c] = channels_[c].on(field);
-    }
+    near_ = bound_.mesh_.elementsNear(lattice_, boxes_, execution_);
+    deviceMesh_ = meshOnDevice();
+    if (near_ && !deviceMesh_) part_ = bound_.mesh_.part(*near_);
+    channels_ = part_ ? bound_.channelsOn(*part_) : bound_.channels_;
     plan();
     statistics_.addMs(stage::bin, timer.restart());
     try {
@@ -249,7 +257,6 @@ ResampleStatistics BoundRaster::Run::all() {
 }
 
 void BoundRaster::Run::plan() {
-    deviceMesh_ = meshOnDevice();
     const std::vector<RasterRegion> regions = planRasterRegions(boxes_, budget_.regionPoints);
     left_.assign(regions.begin(), regions.end());
     axes_ = SliceAxes::along(2);
@@ -257,10 +264,14 @@ void BoundRaster::Run::plan() {
         if (!slots_ && !bound_.isScan_)
             axes_ = SliceAxes::along(bound_.sliceAxis_.value_or(
                 deviceMesh_->layerAxis({lattice_.uWorld.x, lattice_.vWorld.y, lattice_.wWorld.z})));
-        device_.thread().run(
-            [&](GlContext& context) { device_.records().place(context, *deviceMesh_, lattice_); });
+        const std::span<const std::int32_t> candidates =
+            near_ ? std::span(*near_) : std::span<std::int32_t>();
+        device_.thread().run([&](GlContext& context) {
+            device_.records().place(context, *deviceMesh_, lattice_, candidates);
+            device_.countUpload(std::int64_t(candidates.size_bytes()));
+        });
     } else {
-        placeNodes();
+        frame_ = frameNodes(mesh(), lattice_, execution_);
         if (!slots_ && !bound_.isScan_)
             axes_ = SliceAxes::along(bound_.sliceAxis_ ? *bound_.sliceAxis_
                                                        : chooseLayerAxis(mesh(), frame_, execution_));
@@ -270,29 +281,32 @@ void BoundRaster::Run::plan() {
     partsLeft_.assign(boxes_.size(), 0);
     for (const RasterRegion& region : left_)
         for (const RasterRegion::Part& part : region.parts) ++partsLeft_[part.box];
-    statistics_.add(counted::elementsNear, mesh().elementCount());
+    statistics_.add(counted::elementsNear, near_ ? std::int64_t(near_->size()) : mesh().elementCount());
     statistics_.add(counted::coveredPoints, 0);
     statistics_.add(counted::elementBlockPairs, std::int64_t(bins_.elements.size()));
 }
 
 std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
     if (bound_.isPublished_ || bound_.primitives_ == Primitives::processor) return nullptr;
-    // What is near a few boxes is gathered for them, and not worth the way to the device.
-    if (part_ || mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
+    if (mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
+    std::int64_t points = 0;
+    for (const IndexBox& box : boxes_) points += box.count();
+    if (near_ && (near_->empty() || points <= kFewPoints)) return nullptr;
     // An emulated device's memory is this process's own.
-    const WorkMemory work = rasterWorkMemory(int(channels_.size()));
+    const auto channels = int(bound_.channels_.size());
+    const WorkMemory work = rasterWorkMemory(channels);
     const std::int64_t bytes = bound_.workBytes_ > 0 ? std::max(bound_.workBytes_, work.least) : work.most;
-    const std::int64_t ofMesh = DeviceMesh::bytesOf(mesh(), channels_);
+    const std::int64_t ofMesh = DeviceMesh::bytesOf(mesh(), bound_.channels_);
     GlThread& thread = device_.thread();
     if (thread.info().isSoftware) {
         if (ofMesh > bytes / 4) return nullptr;
-        budget_ = shareOut(bytes - ofMesh, int(channels_.size()));
+        budget_ = shareOut(bytes - ofMesh, channels);
     } else if (ofMesh > thread.info().limits.storageBlockBytes) {
         return nullptr;  // no buffer may be larger
     }
     if (!thread.run([&](GlContext& context) { return device_.records().isExact(context); })) return nullptr;
     if (bound_.onDevice_ || bound_.isTooLarge_) return bound_.onDevice_;
-    const DeviceMesh::Source source(mesh(), channels_, bound_.format_, execution_);
+    const DeviceMesh::Source source(mesh(), bound_.channels_, bound_.format_, execution_);
     try {
         bound_.onDevice_ = thread.run([&](GlContext& context) {
             auto made = std::make_unique<DeviceMesh>(context, source);
@@ -305,10 +319,6 @@ std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
         bound_.isTooLarge_ = true;  // regions may have room where the mesh has none
     }
     return bound_.onDevice_;
-}
-
-void BoundRaster::Run::placeNodes() {
-    if (frame_.nodes.empty()) frame_ = frameNodes(mesh(), lattice_, execution_);
 }
 
 /// Regions that more elements reach than there is memory for are cut.
@@ -370,9 +380,14 @@ void BoundRaster::Run::startOnDevice() {
     const Timer timer;
     const auto made = std::make_shared<const RecordMaker::Made>(makeRecords(job));
     statistics_.addMs(stage::bin, timer.elapsedMs());
-    job.prepared.hard = made->hard;
-    statistics_.add(counted::exactElements, std::int64_t(job.prepared.hard.size()));
-    if (!job.prepared.hard.empty()) placeNodes();
+    statistics_.add(counted::exactElements, std::int64_t(made->hard.size()));
+    // Those that the processor decides become a mesh of their own.
+    const TetMesh hard = bound_.mesh_.part(made->hard);
+    const NodeFrame hardFrame = frameNodes(hard, lattice_, execution_);
+    const std::vector<ChannelCoding> hardChannels = bound_.channelsOn(hard);
+    const RasterInputs ofHard{hard, hardFrame, hardChannels, bound_.format_, axes_};
+    job.prepared.hard.resize(made->hard.size());
+    std::iota(job.prepared.hard.begin(), job.prepared.hard.end(), 0);
     const RasterInputs inputs = this->inputs();
     for (std::size_t pass = 0; pass < inputs.passCount(); ++pass) {
         const bool isLast = pass + 1 == inputs.passCount();
@@ -380,7 +395,7 @@ void BoundRaster::Run::startOnDevice() {
             device_.begin(context, job.region.points, inputs, pass, *deviceMesh_, bound_.isScan_);
         }));
         auto points = std::make_shared<const std::vector<DecidedPoint>>(
-            decideHardElements(inputs, job.prepared, pass, execution_));
+            decideHardElements(ofHard, job.prepared, pass, execution_));
         job.draws.push_back(device_.thread().post([this, points, made, pass, isLast](GlContext& context) {
             if (bound_.isScan_) {
                 ScanRecords records = device_.records().records();

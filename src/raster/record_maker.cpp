@@ -165,13 +165,13 @@ const GlProgram& RecordMaker::program(GlContext& context, Stage stage, int chann
     const auto ofStage = [&] {
         switch (stage) {
             case Stage::frame:
-                return made(text::kFrameNodes, {});
+                return made(text::kFrameNodes, {text::kLookedAt});
             case Stage::near:
-                return made(text::kNearElements, {});
+                return made(text::kNearElements, {text::kLookedAt});
             case Stage::sums:
                 return made(text::kPrefixSums, {});
             case Stage::list:
-                return made(text::kListElements, {});
+                return made(text::kListElements, {text::kLookedAt});
             case Stage::easyGeometry:
             case Stage::thinGeometry:
                 return made(text::kRecordGeometry,
@@ -226,18 +226,29 @@ bool RecordMaker::isExact(GlContext& context) {
     return *isExact_;
 }
 
-void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice) {
+void RecordMaker::useLookedAt(const ComputeUse& used, bool areLookedAt) const {
+    used.bind(3, candidates_ ? candidates_ : frame_);  // where none are read, any
+    used.flag("areCandidates", areLookedAt && candidates_);
+}
+
+void RecordMaker::place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice,
+                        std::span<const std::int32_t> candidates) {
     TESSERA_CHECK(lattice.isAxisParallel(), "nodes of turned lattices are placed by the processor");
     grow(context, frame_, mesh.nodeCount_ * 6 * sizeof(double));
     grow(context, rough_, mesh.nodeCount_ * 4 * sizeof(float));
+    candidates_ = candidates.empty() ? GlBuffer() : GlBuffer(context, candidates);
+    lookedAt_ = candidates.empty() ? mesh.elementCount_ : candidates.size();
+    const std::size_t count = candidates.empty() ? mesh.nodeCount_ : 4 * candidates.size();
     const ComputeUse placing = use(context, Stage::frame);
+    useLookedAt(placing);
+    placing.bind(4, mesh.tets_);
     placing.bind(0, mesh.nodes_);
     placing.bind(1, frame_);
     placing.bind(2, rough_);
     placing.set("originWorld", lattice.originWorld);
     placing.set("spacingWorld", Vec3d(lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z));
-    placing.set("nodeCount", mesh.nodeCount_);
-    placing.run(mesh.nodeCount_);
+    placing.set("nodeCount", count);
+    placing.run(count);
 }
 
 void RecordMaker::usePlaced(ComputeUse& used, const DeviceMesh& mesh) const {
@@ -278,34 +289,36 @@ std::size_t RecordMaker::addUp(GlContext& context, const GlBuffer& items, std::s
 }
 
 void RecordMaker::list(GlContext& context, const GlBuffer& marks, const GlBuffer& sums, std::size_t words,
-                       const GlBuffer& listed) {
+                       const GlBuffer& listed, bool areLookedAt) {
     const ComputeUse listing = use(context, Stage::list);
     listing.bind(0, marks);
     listing.bind(1, sums);
     listing.bind(2, listed);
+    useLookedAt(listing, areLookedAt);
     listing.set("wordCount", words);
     listing.run(words);
 }
 
 std::int64_t RecordMaker::findNear(GlContext& context, const DeviceMesh& mesh, const IndexBox& points) {
     points_ = points;
-    const std::size_t words = (mesh.elementCount_ + 31) / 32;
+    const std::size_t words = (lookedAt_ + 31) / 32;
     listedCount_ = 0;
     if (words == 0) return 0;
     grow(context, marks_, words * sizeof(GLuint));
     fill(context, marks_, words * sizeof(GLuint));
     const ComputeUse near = use(context, Stage::near);
+    useLookedAt(near);
     near.bind(0, mesh.tets_);
     near.bind(1, rough_);
     near.bind(2, marks_);
-    near.set("elementCount", mesh.elementCount_);
+    near.set("itemCount", lookedAt_);
     const auto setPlace = [&](const char* name, const Vec3i& place) {
         context.functions().ProgramUniform3f(near.program.id(), near.at(name), float(place.x), float(place.y),
                                              float(place.z));
     };
     setPlace("lowest", points.min);
     setPlace("highest", points.max - 1);
-    near.run(mesh.elementCount_);
+    near.run(lookedAt_);
     const std::size_t total = addUp(context, marks_, words, true, markSums_);
     listedCount_ = readItems<GLuint>(context, markSums_, total, 1).front();
     TESSERA_CHECK(listedCount_ < std::size_t(1) << kRankKindShift, "ranks hold the records");
@@ -339,9 +352,9 @@ std::optional<RecordMaker::Made> RecordMaker::makeGeometry(GlContext& context, c
                 largestBuffer(listed, thin, channels) <= context.info().limits.storageBlockBytes);
     };
     if (!fits()) return std::nullopt;
-    const std::size_t markWords = (mesh.elementCount_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
+    const std::size_t markWords = (lookedAt_ + 31) / 32, thinWords = (listedCount_ + 31) / 32;
     grow(context, listed_, listedCount_ * sizeof(GLuint));
-    list(context, marks_, markSums_, markWords, listed_);
+    list(context, marks_, markSums_, markWords, listed_, true);
 
     // One more bucket than there are: before the last stand all.
     const std::size_t counters = layerAxis ? kKinds * kLayers + kEmptyCounters : 2 * kBuckets + 1;

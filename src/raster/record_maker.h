@@ -79,7 +79,9 @@ class RecordMaker {
     bool isExact(GlContext& context);
 
     /// Places the mesh's nodes in an axis-parallel lattice, for all regions that follow.
-    void place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice);
+    /// @param candidates when not empty, only these elements are looked at, and only their nodes placed.
+    void place(GlContext& context, const DeviceMesh& mesh, const Lattice& lattice,
+               std::span<const std::int32_t> candidates = {});
 
     /// Lists the elements that may have points in a region of at most kCellEdge points an axis; returns how
     /// many there are.
@@ -125,12 +127,14 @@ class RecordMaker {
     const GlProgram& program(GlContext& context, Stage stage, int channels = 0);
     ComputeUse use(GlContext& context, Stage stage, int channels = 0);
     void usePlaced(ComputeUse& used, const DeviceMesh& mesh) const;
+    void useLookedAt(const ComputeUse& used, bool areLookedAt = true) const;
     /// Makes sums of all items before each; the sum of all stands behind them, at the place that is returned.
     std::size_t addUp(GlContext& context, const GlBuffer& items, std::size_t count, bool areBits,
                       GlBuffer& sums);
-    /// Lists what is marked, ascending.
+    /// Lists what is marked, ascending. @param areLookedAt marks are of what is looked at, and elements
+    /// wanted.
     void list(GlContext& context, const GlBuffer& marks, const GlBuffer& sums, std::size_t words,
-              const GlBuffer& listed);
+              const GlBuffer& listed, bool areLookedAt = false);
     /// Both give the number of hard elements, and note that of thin ones.
     std::size_t countBuckets(GlContext& context, std::size_t thinTotal, std::vector<ScanRun>& runs);
     std::size_t countLayers(GlContext& context, std::size_t thinTotal, Made& made);
@@ -139,12 +143,12 @@ class RecordMaker {
 
     std::map<std::pair<Stage, int>, GlProgram> programs_;
     std::optional<bool> isExact_;
-    GlBuffer frame_, rough_;
+    GlBuffer frame_, rough_, candidates_;
     GlBuffer marks_, markSums_, listed_;
     GlBuffer easyGeometry_, easyChannels_, thinGeometry_, thinChannels_;
     GlBuffer boxes_, sorted_, thinMarks_, thinSums_, thinSlots_, boxCounts_, bucketSums_, hard_, counts_;
     IndexBox points_;
-    std::size_t listedCount_ = 0, thinCount_ = 0;
+    std::size_t lookedAt_ = 0, listedCount_ = 0, thinCount_ = 0;
 };
 
 }  // namespace tessera

@@ -92,8 +92,9 @@ bool BoundMesh::wantsIndex(const Lattice& lattice, std::span<const IndexBox> box
     return isShared_ || index_->ifBuilt() || passes_.fetch_add(1) >= kPassesBeforeIndex;
 }
 
-std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const IndexBox> boxes,
-                                       const Execution& execution) const {
+std::optional<std::vector<std::int32_t>> BoundMesh::elementsNear(const Lattice& lattice,
+                                                                 std::span<const IndexBox> boxes,
+                                                                 const Execution& execution) const {
     if (!wantsIndex(lattice, boxes)) return std::nullopt;
     const ElementIndex& index = index_->get(execution);
     const std::size_t most = route_ == Route::automatic
@@ -105,7 +106,17 @@ std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const I
         if (elements.size() > most) return std::nullopt;
     }
     if (boxes.size() > 1) sortEachOnce(elements);
+    return elements;
+}
+
+TetMesh BoundMesh::part(std::span<const std::int32_t> elements) const {
     return extractElements(whole(), elements, fields_);
+}
+
+std::optional<TetMesh> BoundMesh::near(const Lattice& lattice, std::span<const IndexBox> boxes,
+                                       const Execution& execution) const {
+    const auto elements = elementsNear(lattice, boxes, execution);
+    return elements ? std::optional(part(*elements)) : std::nullopt;
 }
 
 }  // namespace tessera

@@ -24,9 +24,15 @@ class BoundMesh {
     const TetMesh& whole() const { return index_->mesh(); }
     std::span<const int> fields() const { return fields_; }
 
-    /// The elements that can reach the boxes, as a mesh of their own whose fields are the bound ones.
-    /// Elements and nodes keep their order, so samples have the same bits. Null where a pass over the whole
-    /// mesh is to be taken. Several threads may call at once.
+    /// The elements that can reach the boxes, ascending. Null where a pass over the whole mesh is to be
+    /// taken. Several threads may call at once.
+    std::optional<std::vector<std::int32_t>> elementsNear(const Lattice& lattice,
+                                                          std::span<const IndexBox> boxes,
+                                                          const Execution& execution) const;
+    /// Some elements, ascending, as a mesh of their own whose fields are the bound ones. Elements and nodes
+    /// keep their order, so samples have the same bits.
+    TetMesh part(std::span<const std::int32_t> elements) const;
+    /// part() of elementsNear().
     std::optional<TetMesh> near(const Lattice& lattice, std::span<const IndexBox> boxes,
                                 const Execution& execution) const;
 

@@ -1,4 +1,5 @@
-// Nodes in the index space of an axis-parallel lattice, a thread a node, as src/index_space/node_kernel.cpp does it.
+// Nodes in the index space of an axis-parallel lattice, as src/index_space/node_kernel.cpp does it: a thread a node of
+// the mesh, or of an element that is looked at.
 layout(std430, binding = 0) readonly buffer Nodes {
     double nodesWorld[];  // x, y, z
 };
@@ -7,6 +8,9 @@ layout(std430, binding = 1) writeonly buffer Frame {
 };
 layout(std430, binding = 2) writeonly buffer Rough {
     vec4 rough[];  // rounded places; far ones are cut
+};
+layout(std430, binding = 4) readonly buffer Tets {
+    uvec4 tets[];
 };
 uniform dvec3 originWorld, spacingWorld;
 uniform uint nodeCount;
@@ -25,6 +29,8 @@ dvec3 remainder(dvec3 t, dvec3 whole, dvec3 h) {
 void main() {
     uint node = threadIndex();
     if (node >= nodeCount) return;
+    // Several threads may write the same.
+    if (areCandidates) node = tets[candidates[node >> 2]][node & 3u] & ~(1u << 31);
     precise dvec3 place = dvec3(nodesWorld[3u * node], nodesWorld[3u * node + 1u], nodesWorld[3u * node + 2u]);
     precise dvec3 t = place - originWorld;
     precise dvec3 back = t - place;

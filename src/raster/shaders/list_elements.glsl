@@ -14,5 +14,6 @@ void main() {
     uint word = threadIndex();
     if (word >= wordCount) return;
     uint to = sums[word];
-    for (uint left = marks[word]; left != 0u; left &= left - 1u) listed[to++] = 32u * word + uint(findLSB(left));
+    for (uint left = marks[word]; left != 0u; left &= left - 1u)
+        listed[to++] = elementOf(32u * word + uint(findLSB(left)));
 }

@@ -1,4 +1,5 @@
-// Marks the elements that may have points in the region, a thread an element: by rounded places, and so some more.
+// Marks the elements that may have points in the region, a thread for each that is looked at: by rounded places, and
+// so some more.
 layout(std430, binding = 0) readonly buffer Tets {
     uvec4 tets[];
 };
@@ -6,9 +7,9 @@ layout(std430, binding = 1) readonly buffer Rough {
     vec4 rough[];
 };
 layout(std430, binding = 2) buffer Marks {
-    uint marks[];  // a bit an element
+    uint marks[];  // a bit for each that is looked at
 };
-uniform uint elementCount;
+uniform uint itemCount;
 uniform vec3 lowest, highest;  // points of the region
 
 // True when the element surely covers none of the eight points that follow the first: by the bound in
@@ -37,9 +38,9 @@ bool liesBetween(vec3 n0, vec3 n1, vec3 n2, vec3 n3, vec3 first, float extent, f
 }
 
 void main() {
-    uint element = threadIndex();
-    if (element >= elementCount) return;
-    uvec4 tet = tets[element];
+    uint item = threadIndex();
+    if (item >= itemCount) return;
+    uvec4 tet = tets[elementOf(item)];
     vec4 ofA = rough[tet.x & ~(1u << 31)], ofB = rough[tet.y], ofC = rough[tet.z], ofD = rough[tet.w];
     if (ofA.w + ofB.w + ofC.w + ofD.w > 0.0) return;
     vec3 a = ofA.xyz, b = ofB.xyz, c = ofC.xyz, d = ofD.xyz;
@@ -52,5 +53,5 @@ void main() {
     high = min(floor(high + room), highest);
     if (!all(lessThanEqual(low, high))) return;
     if (all(lessThanEqual(high, low + 1.0)) && liesBetween(a, b, c, d, low, extent, farthest)) return;
-    atomicOr(marks[element >> 5], 1u << (element & 31u));
+    atomicOr(marks[item >> 5], 1u << (item & 31u));
 }
