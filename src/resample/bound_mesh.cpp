@@ -18,6 +18,26 @@ constexpr double kLargestShare = 0.25;
 constexpr double kLargestVolumeShare = 0.25;
 /// Elements between the points of a box count for so much: they are looked at, but not sampled.
 constexpr std::int64_t kLookedAtForOne = 4;
+/// Boxes that fill this share of the one around them are looked for as one: bricks side by side.
+constexpr double kOneBoxShare = 0.75;
+
+// The boxes, or one that holds them all and little else.
+std::vector<IndexBox> joined(std::span<const IndexBox> boxes) {
+    std::vector<IndexBox> all;
+    for (const IndexBox& box : boxes)
+        if (!box.empty()) all.push_back(box);
+    if (all.size() < 2) return all;
+    IndexBox around = all.front();
+    double points = 0;
+    for (const IndexBox& box : all) {
+        around.min = glm::min(around.min, box.min);
+        around.max = glm::max(around.max, box.max);
+        points += double(box.count());
+    }
+    const Vec3d size = Vec3d(around.max) - Vec3d(around.min);
+    if (points >= kOneBoxShare * size.x * size.y * size.z) return {around};
+    return all;
+}
 
 PointGrid gridOf(const Lattice& lattice) {
     return {lattice.originWorld, {lattice.uWorld.x, lattice.vWorld.y, lattice.wWorld.z}, kNearMarginVoxels};
@@ -101,11 +121,12 @@ std::optional<std::vector<std::int32_t>> BoundMesh::elementsNear(const Lattice& 
                                  ? std::size_t(kLargestShare * double(index.elementCount()))
                                  : ElementIndex::kEvery;
     std::vector<std::int32_t> elements;
-    for (const IndexBox& box : boxes) {
+    const std::vector<IndexBox> all = joined(boxes);
+    for (const IndexBox& box : all) {
         findNear(index, lattice, box, most, elements);
         if (elements.size() > most) return std::nullopt;
     }
-    if (boxes.size() > 1) sortEachOnce(elements);
+    if (all.size() > 1) sortEachOnce(elements);
     return elements;
 }
 
