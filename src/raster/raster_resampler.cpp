@@ -27,6 +27,9 @@ namespace tessera {
 
 namespace {
 
+/// Fewer near the boxes become records faster on the processor.
+constexpr std::size_t kManyElements = std::size_t(1) << 15;
+
 /// A region on its way through the device.
 struct RegionJob {
     RasterRegion region;
@@ -109,8 +112,8 @@ class BoundRaster : public BoundResampler {
 
       private:
         void plan();
-        /// The mesh as the device makes records of it; null where the processor makes them. A brick alone is
-        /// not worth the way to the device.
+        /// The mesh as the device makes records of it; null where the processor makes them: few elements, or
+        /// what is near a brick alone, aren't worth the way to the device.
         std::shared_ptr<const DeviceMesh> meshOnDevice();
         void binRegions();
         /// Starts the first region that is left, the index-th of all.
@@ -291,7 +294,8 @@ std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
     if (mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
     std::int64_t points = 0;
     for (const IndexBox& box : boxes_) points += box.count();
-    if (near_ && (near_->empty() || points <= kFewPoints)) return nullptr;
+    const std::size_t worthIt = bound_.mesh_.route() == Route::automatic ? kManyElements : 1;
+    if (near_ && (near_->size() < worthIt || points <= kFewPoints)) return nullptr;
     // An emulated device's memory is this process's own.
     const auto channels = int(bound_.channels_.size());
     const WorkMemory work = rasterWorkMemory(channels);

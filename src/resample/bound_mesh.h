@@ -23,6 +23,7 @@ class BoundMesh {
 
     const TetMesh& whole() const { return index_->mesh(); }
     std::span<const int> fields() const { return fields_; }
+    Route route() const { return route_; }
 
     /// The elements that can reach the boxes, ascending. Null where a pass over the whole mesh is to be
     /// taken. Several threads may call at once.
