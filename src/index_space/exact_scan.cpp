@@ -187,7 +187,7 @@ struct Sum {
 template <class Real>
 Sum sumOf(const Real& x) {
     const double high = toDouble(x);
-    return {high, toDouble(Real(x - Real(high)))};
+    return {high, std::isfinite(high) ? toDouble(Real(x - Real(high))) : 0};
 }
 Sum operator*(const Sum& p, double factor) {
     const double high = p.high * factor;
@@ -206,21 +206,16 @@ class RoughScanlines {
     template <class Real>
     RoughScanlines(const ExactElement<Real>& e, int s, int t, int r) {
         const Real slack = e.dilation == 0 ? 0.0 : kBoxSlack;
-        planes_[0] = {sumOf(Real(e.low[s] - slack)), {0, 0}, {0, 0}, Side::lower};
-        planes_[1] = {sumOf(Real(e.high[s] + slack)), {0, 0}, {0, 0}, Side::upper};
+        add({sumOf(Real(e.low[s] - slack)), {0, 0}, {0, 0}, Side::lower});
+        add({sumOf(Real(e.high[s] + slack)), {0, 0}, {0, 0}, Side::upper});
         for (int k = 0; k < 4; ++k) {
             const Real& slope = e.gradient[k][s];
             const Real by = slope == 0 ? Real(1) : Real(-slope);
-            const Plane plane{sumOf(Real((e.dilation + e.constant[k]) / by)),
-                              sumOf(Real(e.gradient[k][t] / by)), sumOf(Real(e.gradient[k][r] / by)),
-                              slope == 0  ? Side::along
-                              : slope > 0 ? Side::lower
-                                          : Side::upper};
-            // One whose solution would overflow decides nothing here.
-            if (std::fabs(plane.a.high) + std::fabs(plane.b.high) + std::fabs(plane.c.high) < 1e200)
-                planes_[std::size_t(count_++)] = plane;
-            else
-                isComplete_ = false;
+            add({sumOf(Real((e.dilation + e.constant[k]) / by)), sumOf(Real(e.gradient[k][t] / by)),
+                 sumOf(Real(e.gradient[k][r] / by)),
+                 slope == 0  ? Side::along
+                 : slope > 0 ? Side::lower
+                             : Side::upper});
         }
     }
 
@@ -241,6 +236,14 @@ class RoughScanlines {
         Side side;
     };
 
+    // One whose solution would overflow decides nothing here.
+    void add(const Plane& plane) {
+        if (std::fabs(plane.a.high) + std::fabs(plane.b.high) + std::fabs(plane.c.high) < 1e200)
+            planes_[std::size_t(count_++)] = plane;
+        else
+            isComplete_ = false;
+    }
+
     // @param unit of the error, above the rounding of a, b, c and of the bound.
     template <class Bound>
     bool find(const Bound& boundOf, double unit, double t, double r, double& begin, double& end) const {
@@ -250,8 +253,9 @@ class RoughScanlines {
         for (int i = 0; i < count_; ++i) {
             const Plane& p = planes_[std::size_t(i)];
             const Sum bound = boundOf(p);
+            // The last term is for denormal numbers.
             const double error =
-                unit * (std::fabs(p.a.high) + std::fabs(p.b.high * t) + std::fabs(p.c.high * r));
+                unit * (std::fabs(p.a.high) + std::fabs(p.b.high * t) + std::fabs(p.c.high * r)) + 1e-290;
             if (p.side == Side::along) {
                 const double value = bound.high + bound.low;
                 if (value < -error) begins[0] = kInfinity;
@@ -259,8 +263,10 @@ class RoughScanlines {
                 continue;
             }
             const double nearest = std::nearbyint(bound.high), beyond = (bound.high - nearest) + bound.low;
-            // Whole numbers as far away as that have no neighbours.
-            const double far = std::fabs(nearest) < 0x1p52 ? 0 : 0x1p-50 * std::fabs(nearest);
+            // An error of half a voxel or more reaches other voxels; whole numbers far away have no
+            // neighbours.
+            const bool isNear = std::fabs(nearest) < 0x1p52 && error < 0.5;
+            const double far = isNear ? 0 : error + 0x1p-50 * std::fabs(nearest) + 1;
             if (p.side == Side::lower) {
                 begins[0] = std::max(begins[0], nearest - far + (beyond > error ? 1 : 0));
                 begins[1] = std::max(begins[1], nearest + far + (beyond >= -error ? 1 : 0));
@@ -275,7 +281,7 @@ class RoughScanlines {
     }
 
     std::array<Plane, 6> planes_;
-    int count_ = 2;
+    int count_ = 0;
     bool isComplete_ = true;
 };
 

@@ -10,7 +10,7 @@ namespace tessera {
 
 namespace {
 
-constexpr std::size_t kFewPartSizes = 6, kFewThreads = std::size_t(1) << 18;
+constexpr std::size_t kFewThreads = std::size_t(1) << 18;
 
 std::uint32_t packed(const Vec3i& place) {
     return std::uint32_t(place.x) | std::uint32_t(place.y) << 8 | std::uint32_t(place.z) << 16;
@@ -48,8 +48,8 @@ std::size_t firstBucket(std::size_t i) {
 
 }  // namespace
 
-// A brick's boxes have few parts: its runs are always four.
-std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first) {
+std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first,
+                                  const IndexBox& region) {
     std::vector<ScanRun> runs;
     for (const bool isThin : {false, true}) {
         const std::uint32_t* const at = first.data() + (isThin ? kPartSizes + 1 : 0);
@@ -60,7 +60,7 @@ std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes
         };
         add(0, 0);
         // Where threads without a part cost little, all larger boxes in one go.
-        if (most <= kFewPartSizes || std::size_t(at[most + 1] - at[1]) << most <= kFewThreads)
+        if (region.count() <= kFewPoints || std::size_t(at[most + 1] - at[1]) << most <= kFewThreads)
             add(1, std::max<std::size_t>(1, most));
         else
             for (std::size_t size = 1; size <= most; ++size) add(size, size);
@@ -82,7 +82,7 @@ ScanBoxes listScanBoxes(const PreparedRegion& region) {
     std::partial_sum(next.begin(), next.end(), next.begin());
     std::array<std::uint32_t, 2 * (kPartSizes + 1) + 1> first;
     for (std::size_t i = 0; i < first.size(); ++i) first[i] = next[firstBucket(i)];
-    ScanBoxes result{{}, listScanRuns(first)};
+    ScanBoxes result{{}, listScanRuns(first, region.points)};
     resizeLarge(result.boxes, boxes.size());
     for (const ScanBox& box : boxes) result.boxes[next[bucketOf(box)]++] = box;
     return result;

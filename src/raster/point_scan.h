@@ -51,8 +51,10 @@ inline constexpr std::size_t kSmallSizes = std::bit_width(unsigned(kPartPoints))
 inline constexpr std::size_t kSmallBuckets = kTiles * kSmallSizes;
 inline constexpr std::size_t kBuckets = kSmallBuckets + kPartSizes * kTiles;  ///< of a grade
 
+/// Of a region no larger than kFewPoints always four.
 /// @param first where the boxes of each size begin: those of easy elements, those of thin ones, and the end.
-std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first);
+std::vector<ScanRun> listScanRuns(std::span<const std::uint32_t, 2 * (kPartSizes + 1) + 1> first,
+                                  const IndexBox& region);
 
 ScanBoxes listScanBoxes(const PreparedRegion& region);
 

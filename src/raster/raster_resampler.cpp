@@ -203,7 +203,7 @@ class BoundRaster : public BoundResampler {
     std::string target_;
     std::shared_ptr<const SliceGenerator> generator_;
     std::vector<ChannelCoding> channels_;
-    mutable std::shared_ptr<const DeviceMesh> onDevice_;  ///< the whole mesh, once a scan needed it
+    mutable std::shared_ptr<const DeviceMesh> onDevice_;  ///< the whole mesh, once a call needed it
     mutable bool isTooLarge_ = false;                     ///< for the device's memory
 };
 

@@ -100,9 +100,9 @@ DeviceMesh::DeviceMesh(GlContext& context, const Source& source)
 }
 
 std::int64_t DeviceMesh::bytesOf(const TetMesh& mesh, std::span<const ChannelCoding> channels) {
-    // Three doubles of a node, and a quarter more than eight when it is placed.
+    // Three doubles of a node, and a quarter more than eight when it is placed; numbers of candidates.
     std::int64_t aNode = 13 * std::int64_t(sizeof(double)),
-                 anElement = 4 * std::int64_t(sizeof(std::int32_t)) + 1;
+                 anElement = 5 * std::int64_t(sizeof(std::int32_t)) + 1;
     for (const ChannelCoding& coding : channels)
         (coding.isOfCells() ? anElement : aNode) +=
             std::int64_t(coding.isOfCells() ? sizeof(float) : sizeof(NodeCode));
@@ -409,7 +409,7 @@ std::size_t RecordMaker::countBuckets(GlContext& context, std::size_t thinTotal,
     count.run(kRunCounts);
     const auto counts = readItems<GLuint>(context, counts_, 0, kRunCounts + 2);
     thinCount_ = counts[0];
-    runs = listScanRuns(std::span(counts).subspan<2, kRunCounts>());
+    runs = listScanRuns(std::span(counts).subspan<2, kRunCounts>(), points_);
     return counts[1];
 }
 

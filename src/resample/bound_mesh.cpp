@@ -1,6 +1,7 @@
 #include "resample/bound_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/check.h"
@@ -21,12 +22,17 @@ constexpr std::int64_t kLookedAtForOne = 4;
 /// Boxes that fill this share of the one around them are looked for as one: bricks side by side.
 constexpr double kOneBoxShare = 0.75;
 
-// The boxes, or one that holds them all and little else.
-std::vector<IndexBox> joined(std::span<const IndexBox> boxes) {
-    std::vector<IndexBox> all;
-    for (const IndexBox& box : boxes)
-        if (!box.empty()) all.push_back(box);
-    if (all.size() < 2) return all;
+// One that holds them all and little else; an empty one where there is none.
+IndexBox joined(std::vector<IndexBox> all) {
+    std::erase_if(all, [](const IndexBox& box) { return box.empty(); });
+    if (all.empty()) return {};
+    // Twins fill nothing more.
+    const auto corners = [](const IndexBox& box) {
+        return std::array{box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z};
+    };
+    std::ranges::sort(all, {}, corners);
+    const auto areTwins = [&](const IndexBox& a, const IndexBox& b) { return corners(a) == corners(b); };
+    all.erase(std::unique(all.begin(), all.end(), areTwins), all.end());
     IndexBox around = all.front();
     double points = 0;
     for (const IndexBox& box : all) {
@@ -35,8 +41,7 @@ std::vector<IndexBox> joined(std::span<const IndexBox> boxes) {
         points += double(box.count());
     }
     const Vec3d size = Vec3d(around.max) - Vec3d(around.min);
-    if (points >= kOneBoxShare * size.x * size.y * size.z) return {around};
-    return all;
+    return points >= kOneBoxShare * size.x * size.y * size.z ? around : IndexBox{};
 }
 
 PointGrid gridOf(const Lattice& lattice) {
@@ -121,12 +126,16 @@ std::optional<std::vector<std::int32_t>> BoundMesh::elementsNear(const Lattice& 
                                  ? std::size_t(kLargestShare * double(index.elementCount()))
                                  : ElementIndex::kEvery;
     std::vector<std::int32_t> elements;
-    const std::vector<IndexBox> all = joined(boxes);
-    for (const IndexBox& box : all) {
+    if (const IndexBox around = joined({boxes.begin(), boxes.end()}); !around.empty()) {
+        findNear(index, lattice, around, most, elements);
+        if (elements.size() <= most) return elements;
+        elements.clear();
+    }
+    for (const IndexBox& box : boxes) {
         findNear(index, lattice, box, most, elements);
         if (elements.size() > most) return std::nullopt;
     }
-    if (all.size() > 1) sortEachOnce(elements);
+    if (boxes.size() > 1) sortEachOnce(elements);
     return elements;
 }
 
