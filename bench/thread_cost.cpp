@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <ctime>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,10 +58,10 @@ int main(int wordCount, char** words) {
                 }
         GlThread& thread = sharedGlThread(chooseGlPlatform({}));
         fmt::print("{:<28}{:>10}{:>16}{:>12}{:>12}\n", "", "ms", "calling thread", "OpenGL's", "uploaded");
-        for (const Resampler* resampler : resamplers())
+        for (const Resampler* resampler : resamplers()) {
+            if (!resampler->info().isOnDevice || !resampler->info().meetsContract) continue;
             for (const std::vector<IndexBox>& boxes :
                  {std::vector{IndexBox{Vec3i(0), Vec3i(points)}}, bricks}) {
-                if (!resampler->info().isOnDevice || !resampler->info().meetsContract) continue;
                 const auto slots = DeviceSamples::make(
                     thread, boxes, codingsOf(mesh, fields, SampleFormat::r32f), SampleFormat::r32f);
                 BindOptions bind;
@@ -70,8 +69,8 @@ int main(int wordCount, char** words) {
                 bind.route = boxes.size() > 1 ? Route::index : Route::automatic;
                 const auto bound = resampler->bind(mesh, fields, bind);
                 std::vector<Times> all;
-                for (int run = -1; run < runs;
-                     ++run) {  // the first one compiles shaders and uploads the mesh
+                // The first one compiles shaders and uploads the mesh.
+                for (int run = -1; run < runs; ++run) {
                     const auto onGl = [&] { return thread.run([](GlContext&) { return threadMs(); }); };
                     const double gl = onGl(), caller = threadMs();
                     const Timer timer;
@@ -90,6 +89,7 @@ int main(int wordCount, char** words) {
                            of(&Times::wallMs), of(&Times::callerMs), of(&Times::glMs),
                            of(&Times::uploadBytes));
             }
+        }
         return 0;
     });
 }

@@ -10,6 +10,7 @@ namespace tessera {
 
 namespace {
 
+/// Threads, with or without a part, that larger boxes of all sizes may have together.
 constexpr std::size_t kFewThreads = std::size_t(1) << 18;
 
 std::uint32_t packed(const Vec3i& place) {

@@ -19,7 +19,7 @@ namespace {
 constexpr int kPadding = kSmallExtent + 2;
 /// Voxels to depth: steps of 2^-11 voxel up to kLargestHeight.
 constexpr const char* kDepthScale = "1.220703125e-4";
-/// Of a scan: dispatches that may be made once more, and bytes of what it notes.
+/// Of a scan: dispatches that may be made once more, threads of one, and bytes of what it notes.
 constexpr std::size_t kMostAgain = kMostScanRuns + 2;
 constexpr std::size_t kThreadsAtOnce = std::size_t(1) << 28;
 constexpr std::int64_t kOwnerBytes = 4, kContenderBytes = 16, kLeastContenders = 1 << 16;

@@ -267,8 +267,8 @@ void BoundRaster::Run::plan() {
         if (!slots_ && !bound_.isScan_)
             axes_ = SliceAxes::along(bound_.sliceAxis_.value_or(
                 deviceMesh_->layerAxis({lattice_.uWorld.x, lattice_.vWorld.y, lattice_.wWorld.z})));
-        const std::span<const std::int32_t> candidates =
-            near_ ? std::span(*near_) : std::span<std::int32_t>();
+        std::span<const std::int32_t> candidates;
+        if (near_) candidates = *near_;
         device_.thread().run([&](GlContext& context) {
             device_.records().place(context, *deviceMesh_, lattice_, candidates);
             device_.countUpload(std::int64_t(candidates.size_bytes()));
@@ -292,10 +292,12 @@ void BoundRaster::Run::plan() {
 std::shared_ptr<const DeviceMesh> BoundRaster::Run::meshOnDevice() {
     if (bound_.isPublished_ || bound_.primitives_ == Primitives::processor) return nullptr;
     if (mesh().tets.empty() || !lattice_.isAxisParallel()) return nullptr;
-    std::int64_t points = 0;
-    for (const IndexBox& box : boxes_) points += box.count();
-    const std::size_t worthIt = bound_.mesh_.route() == Route::automatic ? kManyElements : 1;
-    if (near_ && (near_->size() < worthIt || points <= kFewPoints)) return nullptr;
+    if (near_) {
+        std::int64_t points = 0;
+        for (const IndexBox& box : boxes_) points += box.count();
+        const std::size_t worthIt = bound_.mesh_.route() == Route::automatic ? kManyElements : 1;
+        if (near_->size() < worthIt || points <= kFewPoints) return nullptr;
+    }
     // An emulated device's memory is this process's own.
     const auto channels = int(bound_.channels_.size());
     const WorkMemory work = rasterWorkMemory(channels);

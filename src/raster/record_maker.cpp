@@ -137,6 +137,7 @@ std::vector<ShaderDefine> recordDefines() {
             {"MARGIN", glslOf(float(2 * kLargestMargin))},
             {"ROUGH_ERROR", glslOf(0x1p-16f)},
             {"ROUGH", glslOf(0x1p-21f)},
+            {"DECIDED_BIT", glslOf(std::size_t(kDecidedBit))},
             {"SMALL_EXTENT", std::to_string(kSmallExtent)},
             {"PART_POINTS", glslOf(std::size_t(kPartPoints))},
             {"PART_SIZES", glslOf(kPartSizes)},

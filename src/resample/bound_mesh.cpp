@@ -126,11 +126,12 @@ std::optional<std::vector<std::int32_t>> BoundMesh::elementsNear(const Lattice& 
                                  ? std::size_t(kLargestShare * double(index.elementCount()))
                                  : ElementIndex::kEvery;
     std::vector<std::int32_t> elements;
-    if (const IndexBox around = joined({boxes.begin(), boxes.end()}); !around.empty()) {
-        findNear(index, lattice, around, most, elements);
-        if (elements.size() <= most) return elements;
-        elements.clear();
-    }
+    if (boxes.size() > 1)
+        if (const IndexBox around = joined({boxes.begin(), boxes.end()}); !around.empty()) {
+            findNear(index, lattice, around, most, elements);
+            if (elements.size() <= most) return elements;
+            elements.clear();
+        }
     for (const IndexBox& box : boxes) {
         findNear(index, lattice, box, most, elements);
         if (elements.size() > most) return std::nullopt;

@@ -30,7 +30,7 @@ void main() {
     uint node = threadIndex();
     if (node >= nodeCount) return;
     // Several threads may write the same.
-    if (areCandidates) node = tets[candidates[node >> 2]][node & 3u] & ~(1u << 31);
+    if (areCandidates) node = tets[candidates[node >> 2]][node & 3u] & ~DECIDED_BIT;
     precise dvec3 place = dvec3(nodesWorld[3u * node], nodesWorld[3u * node + 1u], nodesWorld[3u * node + 2u]);
     precise dvec3 t = place - originWorld;
     precise dvec3 back = t - place;

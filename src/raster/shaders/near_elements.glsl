@@ -41,7 +41,7 @@ void main() {
     uint item = threadIndex();
     if (item >= itemCount) return;
     uvec4 tet = tets[elementOf(item)];
-    vec4 ofA = rough[tet.x & ~(1u << 31)], ofB = rough[tet.y], ofC = rough[tet.z], ofD = rough[tet.w];
+    vec4 ofA = rough[tet.x & ~DECIDED_BIT], ofB = rough[tet.y], ofC = rough[tet.z], ofD = rough[tet.w];
     if (ofA.w + ofB.w + ofC.w + ofD.w > 0.0) return;
     vec3 a = ofA.xyz, b = ofB.xyz, c = ofC.xyz, d = ofD.xyz;
     vec3 low = min(min(a, b), min(c, d)), high = max(max(a, b), max(c, d));

@@ -1,11 +1,10 @@
 // The nodes of an element relative to its first voxel, as src/raster/element_shape.cpp places them.
 layout(std430, binding = 0) readonly buffer Tets {
-    uvec4 tets[];  // kDecidedBit in x: the processor decides
+    uvec4 tets[];  // DECIDED_BIT in x: the processor decides
 };
 layout(std430, binding = 1) readonly buffer Frame {
     double frame[];  // the whole voxels of x, y, z, and the rest
 };
-const uint kDecidedBit = 1u << 31;
 
 struct Placed {
     dvec3 first;

@@ -65,8 +65,8 @@ void main() {
     uint element = listed[slot];
     uvec4 tet = tets[element];
     boxes[slot].rank = kNoBox;
-    bool isDecided = (tet.x & kDecidedBit) != 0u;
-    tet.x &= ~kDecidedBit;
+    bool isDecided = (tet.x & DECIDED_BIT) != 0u;
+    tet.x &= ~DECIDED_BIT;
     Placed placed = placeNodes(tet);
     Shape shape = shapeElement(placed);
     ivec3 low, end;
